@@ -215,6 +215,17 @@ def test_under_weights_holds_that_begin_alike_have_no_step_of_their_own():
     assert scales_of([made]).step_mm == scales_of([made]).range_mm == scales_of([shifted(made, 300.0)]).step_mm
 
 
+def test_under_weights_a_weight_that_stays_on_is_no_step():
+    """Each weight is read in three holds one after the other; between them the wire creeps by a tenth of a mm."""
+    holds = np.repeat(np.arange(1, 10), 2).tolist()
+    weights = np.repeat([4.0, 8.0, 12.0], 6).tolist()
+    x = [14.0, 14.1, 14.1, 14.2, 14.2, 14.3, 18.0, 18.1, 18.1, 18.2, 18.2, 18.3, 22.0, 22.1, 22.1, 22.2, 22.2, 22.3]
+    times = [0.0, 60.0] * 9
+    cut = from_arrays(holds, x, times, weights, length_mm=1000.0, name="w", material="line", control="force")
+    assert scales_of([cut]).step_mm == pytest.approx(3.8)
+    assert scales_of([cut.first(3)]).step_mm == scales_of([cut.first(3)]).range_mm
+
+
 @pytest.mark.parametrize("factor", [2.0**-30, 2.0**7])
 def test_a_geometric_mean_is_multiplied_to_the_last_bit(factor):
     values = [0.3, 7.0, 11.3]

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wirebayes.numeric.distributions import HalfNormal, LogNormal, LogUniform, Normal, Uniform
+from wirebayes.numeric.means import geometric_mean
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext, Own
 from wirebayes.wire.protocol import Protocol
@@ -56,7 +57,7 @@ class SensorDrift(Effect):
     place = "reading"
     formula = "drift"
     scope = "instrument"
-    # a tenth of the typical tension a hold: a sensor that drifts faster is seen before the test
+    # a tenth of the typical tension a hold, of a gauge a tenth of a step: what drifts faster is seen before the test
     amplitudes = (Amplitude("a", "N/s", 0.0, Normal(0.0, 0.1)),)
     sentence = "The force sensor drifts with time."
     sentence_of_weights = "The gauge drifts with time."
@@ -74,7 +75,8 @@ class SensorNonlinearity(Effect):
     place = "reading"
     formula = "square"
     scope = "instrument"
-    # at the typical tension the reading is wrong by a few per cent: a sensor half wrong is no sensor
+    # at the typical tension, under weights at the displacement that the typical weight makes, the reading is wrong by
+    # a few per cent: a sensor half wrong is no sensor
     amplitudes = (Amplitude("a", "1/N", 0.0, Normal(0.0, 0.08)),)
     sentence = "The force sensor is nonlinear at higher tension."
     sentence_of_weights = "The gauge is nonlinear at larger displacements."
@@ -82,6 +84,25 @@ class SensorNonlinearity(Effect):
 
     def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value * (1.0 + own["a"] * value)
+
+    def on(self, protocols: Sequence[Protocol]) -> Effect:
+        """Under weights the unit of a displacement is one step of many, and the prior speaks of what is read."""
+        if not protocols or any(p.control == "displacement" for p in protocols):
+            return self
+        (amplitude,) = type(self).amplitudes
+        typical = geometric_mean(_typical_over_step(p) for p in protocols)
+        own = self.under(self.control)
+        own.amplitudes = (replace(amplitude, prior=amplitude.prior.scaled(1.0 / typical)),)  # type: ignore[misc]
+        return own
+
+
+def _typical_over_step(protocol: Protocol) -> float:
+    """The typical weight in median changes between holds that differ: by proportion, also of the displacements."""
+    weights = protocol.setting[protocol.setting > 0]
+    changes = np.abs(np.diff(protocol.setting))
+    if not (changes > 0).any() or not weights.size:
+        return 1.0
+    return float(np.median(weights)) / float(np.median(changes[changes > 0]))
 
 
 class ClampTransient(Effect):

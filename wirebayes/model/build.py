@@ -164,8 +164,10 @@ def _instrument_priors(experiments: Sequence[Experiment], effects: Sequence[Effe
         marks = [""]
         if len(controls) > 1 and effect.scope != "event":
             marks = [f"[{control}]" for control in controls if effect.control in (None, control)]
-        shared = [(column, a.prior) for column, a in _amplitudes([effect]) if not a.of_each_test]
         for mark in marks:
+            read = [e for e in experiments if mark in ("", f"[{e.control}]") and effect.acts_on(e.name, e.control)]
+            own = effect.on([e.protocol() for e in read])
+            shared = [(column, a.prior) for column, a in _amplitudes([own]) if not a.of_each_test]
             out |= {f"{column}{mark}": prior for column, prior in shared}
     return out
 

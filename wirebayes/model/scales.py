@@ -63,7 +63,7 @@ class Scales:
     Attributes
     ----------
     step_mm : float
-        Median move between holds that differ; of a single hold its displacement.
+        Median move between holds that differ in what is set; of a single hold its displacement.
     range_mm : float
         From the least to the largest displacement, zero included. Under weights, where the zero of a gauge is
         arbitrary, from the wire without tension to the largest displacement, by proportion of the weights.
@@ -147,7 +147,10 @@ def _under_weights(experiment: Experiment) -> Scales:
     weights = np.array([hold.setting for hold in recorded])
     first = np.array([hold.readings[0] for hold in recorded])
     reach = _reach_under_weights(experiment, weights)
-    step = typical_step(first) if np.ptp(first) > 0.0 else reach
+    # a weight that stays on for several holds moves the wire between them by its creep alone
+    moves = np.abs(np.diff(first))[np.diff(weights) != 0.0]
+    moved = moves[moves > 0.0]
+    step = float(np.median(moved)) if moved.size else reach
     lightest = int(weights.argmin())
     zero = float(first[lightest] - reach * weights[lightest] / float(weights.max()))
     settings = [hold.setting for hold in experiment.holds]
