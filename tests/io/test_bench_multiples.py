@@ -109,3 +109,11 @@ def test_counts_grouped_by_apostrophes_are_read_as_counts(tmp_path):
     rows = [f"{t};{x};{5 + n}\n" for n, x in enumerate(("1'000", "2'015")) for t in (0, 10, 20)]
     path.write_text("Time (s);Dial [0.001 mm];Force (N)\n" + "".join(rows))
     assert [hold.setting for hold in convert(path, ABOUT, Choices()).experiment.holds] == [1.0, 2.015]
+
+
+def test_the_refusal_of_turns_says_how_to_write_the_length_of_one(tmp_path):
+    path = tmp_path / "raw.csv"
+    path.write_text("screw (turns),Time (s),Force (N)\n2,0,5\n2,30,4.9\n4,0,9\n4,30,8.9\n")
+    wanted = r'--map "screw \(turns\)=displacement \[0.5 mm\]" \(with the length of one in place of 0.5 mm\)'
+    with pytest.raises(InputError, match=wanted):
+        convert(path, About("wire", "line", 1000.0), Choices())

@@ -221,3 +221,29 @@ def test_a_row_of_channels_is_no_header(tmp_path, above):
     path.write_text("\n".join([*above, *(f"{x},{t},{5 * x - t / 100}" for x in (1, 2) for t in (0, 30, 60))]))
     (made,) = convert(path, ABOUT, Choices())
     assert [row[1:] for row in made.rows[:2]] == [[1.0, 0.0, 5.0], [1.0, 30.0, 4.7]]
+
+
+@pytest.mark.parametrize(
+    ("settings", "numbers"),
+    [
+        ((1, 2, 3, 4, 3, 2), (1, 2, 3, 4, 3, 2)),
+        ((1, 2, 3, 1), (1, 2, 3, 1)),
+        ((1, 2, 3, 1, 2, 3), None),
+        ((1, 2, 2, 3), None),
+    ],
+)
+def test_a_column_for_each_hold_may_load_and_unload(tmp_path, settings, numbers):
+    """Settings that come again in the order of the first time may be those of another specimen."""
+    header = ",Tension (N)\nTime (s)," + ",".join(f"{x} mm" for x in settings)
+    rows = [f"{t}," + ",".join(f"{2 * x - t / 100:.2f}" for x in settings) for t in TIMES]
+    if numbers is None:
+        with pytest.raises(InputError, match="a second time.*is a length or a force with its unit"):
+            read(tmp_path, header, rows)
+        return
+    (made,) = read(tmp_path, header, rows)
+    assert [hold.displacement_mm for hold in made.experiment.holds] == [float(x) for x in numbers]
+
+
+def test_settings_below_a_title_over_all_of_them_are_refused_with_what_to_write(tmp_path):
+    with pytest.raises(InputError, match="with its unit: Time .s., 1 mm, 2 mm, 3 mm; and the unit of the readings in"):
+        read(tmp_path, "time (s),scale (g) at screw turns", [",1,2,3", "0,10,20,30", "15,9,19,29", "30,8,18,28"])

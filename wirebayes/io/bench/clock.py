@@ -36,6 +36,10 @@ UNDERSTOOD = (
 )
 
 
+class UndecidedDates(Undecided):
+    """Dates may begin with the day or with the month."""
+
+
 def looks_like_a_moment(cell: str) -> bool:
     """Whether a cell has the three numbers or more of a clock or a date, but is none that is understood."""
     return not is_value(cell) and len(re.findall(r"\d+", cell)) > 2
@@ -47,9 +51,9 @@ def has_moments(table: RawTable, column: int) -> bool:
 
 
 def are_moments(table: RawTable, column: int) -> bool:
-    """Whether all cells of a column are dates with times, whatever its name."""
-    found = [moment(cell) for cell in table.column(column)]
-    return all(m is not None and m["date"] and m["first"] for m in found)
+    """Whether a column holds dates with times in all readings, whatever its name; lines of words may stand between."""
+    found = [moment(row.cell(column)) for row in table.rows if row.may_be_a_reading]
+    return bool(found) and all(m is not None and m["date"] and m["first"] for m in found)
 
 
 def is_clock(table: RawTable, column: int, unit: Unit | None) -> bool:
@@ -99,7 +103,7 @@ def seconds(table: RawTable, column: int, unit: Unit | None, *, durations: bool 
     values = _values(moments, of_clock, leading)
     lines = [row.line for row in table.rows]
     if moments[0]["date"] is not None:
-        days = _days(table, column, moments)
+        days = _days(table, column, moments, unit)
         time_s = (days - days[0]) + values
         if moments[0]["zone"] is not None:
             return time_s, True, []
@@ -316,9 +320,10 @@ def _falls(moments: _Moments, leading: float) -> int:
     return int(np.sum(np.diff(times) < 0.0))
 
 
-def _days(table: RawTable, column: int, moments: _Moments) -> Floats:
+def _days(table: RawTable, column: int, moments: _Moments, unit: Unit | None = None) -> Floats:
     """Seconds from the beginning of the calendar to each date."""
-    day_first = _day_first(table, column, moments)
+    stated = None if unit is None or unit.clock is None else unit.clock.day_first
+    day_first = _day_first(table, column, moments) if stated is None else stated
     days = []
     for row, found in zip(table.rows, moments, strict=True):
         year, month, day = _date_parts(found, day_first)
@@ -374,7 +379,9 @@ def _day_first(table: RawTable, column: int, moments: _Moments) -> bool:
         return True
     if unclear and len(rows) > 1:
         row = min(unclear)
-        found_date = f"{moments[row]['date']!r}, which may begin with the day or with the month"
-        expected = "a date such as 2024-05-31, or readings of one day"
-        raise table.complain(table.rows[row].line, column, found_date, expected)
+        where = table.where(table.rows[row].line, column)
+        found_date = f"found {moments[row]['date']!r}, which may begin with the day or with the month"
+        map_to = f"--map {table.header[column]}=time"
+        answers = {f"{map_to} [dd/mm/yyyy]": "with the day", f"{map_to} [mm/dd/yyyy]": "with the month"}
+        raise UndecidedDates(f"{where}: {found_date}", "which", answers)
     return True

@@ -27,9 +27,10 @@ from wirebayes.io.bench.two_clocks import best_clock, clock_of, parting
 from wirebayes.io.bench.two_units import finest_of_same
 from wirebayes.io.bench.undecided import Undecided
 from wirebayes.io.bench.unit_names import units_alone
-from wirebayes.io.bench.words import ERRORS, last_named, speaks_of, words_in
+from wirebayes.io.bench.words import COUNTED, ERRORS, last_named, speaks_of, words_in
 from wirebayes.sentences import listed
 
+_ONE_COUNT = "0.5 mm"  # stands for the length of a turn or a step, which only the user knows
 _NEEDED: tuple[Role, ...] = ("displacement", "time", "tension")
 
 
@@ -196,6 +197,24 @@ def _one_clock(table: RawTable, likely: Sequence[int]) -> Column:
     return columns[best_clock(clocks)]
 
 
+def column_as(table: RawTable, index: int, role: Role) -> Column:
+    """A column as one of a quantity, in the unit that the file says.
+
+    Parameters
+    ----------
+    index : int
+        Of the column.
+    role : str
+        The quantity.
+
+    Raises
+    ------
+    InputError
+        It has no unit of the quantity.
+    """
+    return _column(table, index, role, None)
+
+
 def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Column:
     header = table.header[index]
     if role == "hold":
@@ -317,6 +336,9 @@ def _option(table: RawTable, unread: Sequence[int], role: Role) -> str:
     likely = likely or [i for i in unread if quantity_unit(table.header[i], role)]  # named by nothing but its unit
     if len(likely) == 1:
         return f'--map "{table.header[likely[0]]}={role}"'
+    counts = [i for i in unread if role == "displacement" and words_in(table.header[i]) & COUNTED]
+    if len(counts) == 1:
+        return f'--map "{table.header[counts[0]]}={role} [{_ONE_COUNT}]"'
     return f'--map "HEADER={role} [{UNITS[role]}]"'
 
 
@@ -357,7 +379,8 @@ def _how_to_say(table: RawTable, unread: Sequence[int], missing: Sequence[Role])
         options = options.replace("HEADER=", "N=")
         return f"; say which with {options}, N the number of the column"
     about_units = " (a unit only where the header has no unit)" if "HEADER=" in options else ""
-    return f"; say which with {options}{about_units}"
+    about_counts = f" (with the length of one in place of {_ONE_COUNT})" if _ONE_COUNT in options else ""
+    return f"; say which with {options}{about_units}{about_counts}"
 
 
 def _encoding_in_doubt(table: RawTable, names: Sequence[str]) -> str:

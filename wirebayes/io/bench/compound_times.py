@@ -15,6 +15,10 @@ _ANNOUNCED = re.compile(
     rf"|(?:{MINUTES})(?P<of_minutes>{_JOINT})(?:{SECONDS}){_FRACTION}",
     re.IGNORECASE,
 )
+_ORDER = re.compile(  # of a date, in the languages of the columns, and how a clock behind it is written
+    r"(?:(?P<day_first>[dtjg]{1,2}([./-])m{1,2}\2)|m{1,2}([./-])d{1,2}\3)[yja]{2,4}(?:[ T]+(?P<clock>.+))?",
+    re.IGNORECASE,
+)
 _SPELT = re.compile(
     rf"(?:(?P<days>\d+)\s*(?:{_DAYS})[\s,]*)?(?:(?P<clock>\d{{1,2}}:\d\d:\d\d(?:[.,]\d+)?)"
     rf"|(?:(?P<hours>\d+)\s*(?:{HOURS})[\s,]*)?(?:(?P<minutes>\d+)\s*(?:{MINUTES}|['′])[\s,]*)?"
@@ -34,14 +38,22 @@ class Announced:
         Of the first part where cells have two; None where they have three.
     joint : str
         What stands between the first two parts.
+    day_first : bool or None
+        Whether dates begin with the day, else with the month; None where nothing is said of dates.
     """
 
     leading_s: float | None
     joint: str
+    day_first: bool | None = None
 
 
 def announced(text: str) -> Announced | None:
-    """How a text such as ``h-min`` or ``hh:mm:ss`` says that clocks are written; None where it does not."""
+    """How a text such as ``h-min``, ``hh:mm:ss`` or ``mm/dd/yyyy`` says times are written; None where it does not."""
+    order = _ORDER.fullmatch(text)
+    if order is not None:
+        of_clock = announced(order["clock"] or "hh:mm:ss")
+        leading_s = None if of_clock is None else of_clock.leading_s
+        return Announced(leading_s, ":", day_first=order["day_first"] is not None)
     found = _ANNOUNCED.fullmatch(text)
     if found is None:
         return None

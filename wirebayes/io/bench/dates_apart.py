@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from wirebayes.io.bench.clock import are_moments
 from wirebayes.io.bench.compound_times import is_spelt
-from wirebayes.io.bench.header import is_of
+from wirebayes.io.bench.header import is_of, name_and_unit
 from wirebayes.io.bench.quantities import quantity_unit
 from wirebayes.io.bench.sheet import moment
 from wirebayes.io.bench.table import RawTable
@@ -17,6 +17,7 @@ from wirebayes.io.bench.words import plain_letters
 _DAY = {"day", "days", "tag", "jour", "dia", "giorno", "dag", "day no", "tag nr", "jour no"}
 _FIRST_DAY = date(2001, 1, 1)  # whatever it was: days are counted
 _DIGITS = 3  # of the number of a day: no test lasts for years
+_YEAR_LAST = re.compile(r"(\d{1,2})[/-](\d{1,2})[/-](\d{2,4})")
 _HALF_A_DAY = 12  # hours: a clock of the day that begins anew has gone beyond
 _MIDNIGHT = "00:00:00"  # what spreadsheets add to a date
 
@@ -77,11 +78,12 @@ def dated(table: RawTable) -> RawTable:
         return table
     (of_date,) = dates
     (of_clock,) = clocks
+    day_first = _stated_order(table.header[of_date])
     rows = []
     last = ""
     for row in table.rows:
-        date = row.cell(of_date).removesuffix(_MIDNIGHT).strip()
-        last = date or last
+        written = row.cell(of_date).removesuffix(_MIDNIGHT).strip()
+        last = _without_doubt(written, day_first=day_first) or last
         of_row = last
         if are_days:
             of_row = str(_FIRST_DAY + timedelta(days=int(last)))
@@ -91,10 +93,24 @@ def dated(table: RawTable) -> RawTable:
             cells[of_clock] = f"{of_row} {clock}"
         rows.append(replace(row, cells=tuple(cells)))
     header = [*table.header]
-    what = "days" if are_days else "dates"
-    sheet = table.sheet.also(f"{what} from {header[of_date]!r}")
+    sheet = table.sheet.also(f"{'days' if are_days else 'dates'} from {header[of_date]!r}")
     header[of_date] = ""
     return replace(table, sheet=sheet, header=tuple(header), rows=tuple(rows))
+
+
+def _stated_order(header: str) -> bool | None:
+    """Whether a header says that dates begin with the day; None where it says nothing of it."""
+    _, unit = name_and_unit(header, "time")
+    return None if unit is None or unit.clock is None else unit.clock.day_first
+
+
+def _without_doubt(written: str, *, day_first: bool | None) -> str:
+    """A date as one that leaves no doubt, where its header says what it begins with."""
+    found = _YEAR_LAST.fullmatch(written)
+    if found is None or day_first is None:
+        return written
+    first, second, year = found.groups()
+    return f"{first}.{second}.{year}" if day_first else f"{second}.{first}.{year}"
 
 
 def _are_dates(table: RawTable, column: int) -> bool:

@@ -15,12 +15,14 @@ from wirebayes.io.bench.continuous import COVERED, by_plateaus
 from wirebayes.io.bench.control import BY_CHANCE as TREND_BY_CHANCE
 from wirebayes.io.bench.control import trend_by_chance
 from wirebayes.io.bench.flicker import flickers, without_flicker
+from wirebayes.io.bench.hold_clock import by_both
 from wirebayes.io.bench.plateaus import FEWEST, plateaus
 from wirebayes.io.bench.recorded import (
     BEGUN_BEFORE,
     CONTINUOUS,
     PAUSE,
     Cut,
+    HoldClock,
     Readings,
     Rows,
     changes,
@@ -40,6 +42,7 @@ from wirebayes.sentences import counted, holds_in_words, lasting, listed, short
 
 BY_CHANCE = 0.01  # as `wirebayes.io.data_checks` suspects times that run on
 MOVE_SHARE = 0.2  # of the readings of the usual hold: fewer at one displacement are passed in a move
+SOON = 5  # intervals after a move that show how often a device reads there
 LATE = 3.0  # times the least time between readings: nobody who counts from the beginning of a hold begins so late
 ENDS_UNKNOWN = (
     "when a hold ended is not known: if the wire rested between its last reading and the next move, add a row without "
@@ -149,10 +152,16 @@ def _cut_into_groups(
     x = readings.setting
     notes = list(resets)
     times = [readings.time_s[rows] for rows in groups]
-    _check_rising(readings, groups, times)
-    of_test = _since(readings, times, time_since) == "test"
+    both = None if readings.hold_clock is None else by_both(groups, readings.time_s, readings.hold_clock)
+    _check_rising(readings, groups, times if both is None else both[0])
+    of_test = both is not None or _since(readings, times, time_since) == "test"
     ends: list[float | None] = [None] * len(groups)
-    if of_test:
+    if both is not None:
+        times, begins = both
+        ends = [*np.diff(begins).tolist(), None]
+        notes.append(_by_two_clocks(readings.hold_clock))
+        notes += _unread_ends(times, ends, readings.role)
+    elif of_test:
         _check_resets(readings, groups)
         zeros = _between_readings(times)
         ends, of_resets = _ends(times, zeros)
@@ -170,6 +179,12 @@ def _cut_into_groups(
     number, numbering = _numbers(readings, groups, levels)
     notes += numbering
     return Cut(groups, number, levels, times, ends, of_test, notes, readings.time_s)
+
+
+def _by_two_clocks(clock: HoldClock | None) -> str:
+    """What two clocks tell together, in a sentence."""
+    assert clock is not None
+    return f"each hold begins where {clock.name!r} counts from and, by {clock.of_test!r}, lasts until the next begins"
 
 
 def _how_times_count(times: list[Floats], zeros: list[float], resets: Sequence[int]) -> list[str]:
@@ -288,11 +303,16 @@ def _unread_ends(times: list[Floats], ends: Sequence[float | None], role: str) -
 
 
 def _between_readings(times: list[Floats]) -> list[float]:
-    """When each hold began: between two readings of a device that never paused, else at its first reading."""
+    """When each hold began: between two readings of a device that never paused, else at its first reading.
+
+    One that reads often after a move and seldom later was started by the move, and its late intervals tell nothing.
+    """
     zeros = [float(of_hold[0]) for of_hold in times]
     for i, (before, after) in enumerate(zip(times, times[1:], strict=False), 1):
         gap = float(after[0] - before[-1])
-        if len(after) >= CONTINUOUS and 0.0 <= gap <= PAUSE * float(np.median(np.diff(after))):
+        intervals = np.diff(after)
+        usual = min(float(np.median(intervals)), float(np.median(intervals[:SOON]))) if len(after) > 1 else 0.0
+        if len(after) >= CONTINUOUS and 0.0 <= gap <= PAUSE * usual:
             zeros[i] -= 0.5 * gap
     return zeros
 

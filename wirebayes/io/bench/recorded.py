@@ -25,6 +25,26 @@ BEGUN_BEFORE = (
 
 
 @dataclass(frozen=True)
+class HoldClock:
+    """A clock that starts again with each hold, beside one of the whole test.
+
+    Attributes
+    ----------
+    time_s : (r,) array
+        Since each hold began.
+    tick_s : float
+        To which the clock of the test is written.
+    name, of_test : str
+        What the file calls it, and the clock of the test.
+    """
+
+    time_s: Floats
+    tick_s: float
+    name: str
+    of_test: str
+
+
+@dataclass(frozen=True)
 class Readings:
     """Columns of numbers as a bench recorded them, in our units.
 
@@ -41,6 +61,8 @@ class Readings:
         To what the setting was rounded, 0 where it is not known; what the file calls the time.
     complain : function
         Makes the error of a cell.
+    hold_clock : HoldClock or None
+        Where times of each hold stand beside those of the test.
     """
 
     role: Literal["displacement", "tension"]
@@ -52,6 +74,7 @@ class Readings:
     step: float
     time_name: str
     complain: Complain
+    hold_clock: HoldClock | None = None
 
     @property
     def unit(self) -> str:

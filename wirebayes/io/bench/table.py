@@ -15,6 +15,10 @@ LONGEST_HEADER = 200  # characters: names and units take a few words, prose is n
 LONGEST_MARK = 2  # characters: a number or a letter says nothing without the word specimen
 _NUMBER_BEFORE = re.compile(r"^±?[-+−]?\d+([.,]\d+)?\s*")
 _LAST_WORD = re.compile(r"[^\s_/\[\]()]+")
+_SETTINGS_IN_HEADER = (
+    "; what was set in the hold of each column stands in the header, beside the time and each with its unit: "
+    "Time (s), 1 mm, 2 mm, 3 mm; and the unit of the readings in the line above it: Force (N)"
+)
 _SHOWN = 5  # rows that show how many columns there are
 
 
@@ -111,10 +115,10 @@ class RawTable:
         for column, name in enumerate(self.header):
             if name and name in self.header[:column]:
                 where = f"line {self.header_line}, column {self.sheet.column_name(column)}"
-                raise InputError(
-                    f"{self.sheet.path}, {where}: found {name} a second time, expected it once"
-                    f"; of several specimens, number the columns: {name} 1, {name} 2"
-                )
+                how = f"of several specimens, number the columns: {name} 1, {name} 2"
+                if _NUMBER_BEFORE.match(name):
+                    how = "what was set in the hold of each column is a length or a force with its unit, such as 2 mm"
+                raise InputError(f"{self.sheet.path}, {where}: found {name} a second time, expected it once; {how}")
 
 
 def find_table(sheet: Sheet) -> RawTable:
@@ -245,10 +249,14 @@ def _check_width(sheet: Sheet, head: SheetRow, body: Sequence[SheetRow], width: 
     for row in body:
         too_long = (len(row.cells) > width and not remarks) or any(map(is_value, row.cells[named:]))
         if too_long and row.may_be_a_reading:
-            sign = " (a comma as decimal sign needs another sign between cells)" if "comma" in sheet.described else ""
+            how = ""
+            if row is body[0] and not row.cells[0]:  # numbers below a title that stands over all of them
+                how = _SETTINGS_IN_HEADER
+            elif "comma" in sheet.described:
+                how = " (a comma as decimal sign needs another sign between cells)"
             raise InputError(
                 f"{sheet.path}, line {row.line}, column {sheet.column_name(named)}: found {len(row.cells)} cells, "
-                f"expected {named} as in the header of line {head.line}{sign}"
+                f"expected {named} as in the header of line {head.line}{how}"
             )
 
 

@@ -13,10 +13,11 @@ from wirebayes.io.bench import clock
 from wirebayes.io.bench.about import About
 from wirebayes.io.bench.columns import Column, Columns, understand
 from wirebayes.io.bench.complete_rows import WHERE_MISSING, complete_rows
+from wirebayes.io.bench.hold_clock import two_clocks
 from wirebayes.io.bench.marks import without_marks
 from wirebayes.io.bench.numerals import check_signs, decimal_sign, plain_number
 from wirebayes.io.bench.quantities import UNITS, Role, quantity_unit
-from wirebayes.io.bench.recorded import Readings
+from wirebayes.io.bench.recorded import HoldClock, Readings
 from wirebayes.io.bench.resolution import evident_step
 from wirebayes.io.bench.sheet import is_number, of_fraction
 from wirebayes.io.bench.stamps import is_coarse, spread
@@ -62,6 +63,8 @@ class Recorded:
         How holds that have names were numbered, in a sentence.
     not_read : int or None
         The first line without a displacement, which has that of the line above.
+    hold_clock : HoldClock or None
+        Where a clock of holds stands beside one of the test.
     """
 
     table: RawTable
@@ -72,6 +75,7 @@ class Recorded:
     of_day: bool
     numbering: list[str]
     not_read: int | None
+    hold_clock: HoldClock | None = None
 
     def complain(self, row: int, role: str, found: str, expected: str) -> InputError:
         """The error of a cell.
@@ -89,12 +93,14 @@ class Recorded:
 
     def of_rows(self, kept: Ints) -> "Recorded":
         """The same of some rows."""
+        clock = self.hold_clock
         return replace(
             self,
             table=replace(self.table, rows=tuple(self.table.rows[i] for i in kept)),
             texts={role: [texts[i] for i in kept] for role, texts in self.texts.items()},
             values={role: values[kept] for role, values in self.values.items()},
             hold=None if self.hold is None else self.hold[kept],
+            hold_clock=None if clock is None else replace(clock, time_s=clock.time_s[kept]),
         )
 
     def check_zero(self, length_mm: float) -> None:
@@ -129,6 +135,7 @@ class Recorded:
             step,
             self.columns["time"].header,
             self.complain,
+            self.hold_clock,
         )
 
 
@@ -146,16 +153,13 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
     columns = _of_sample(table, columns, about)
     not_read = _first_not_read(table, columns["displacement"])
     table, about_rows = complete_rows(table, columns, choices.drop_breaks)
-    if not_read not in {row.line for row in table.rows}:  # below the readings
-        not_read = None
+    not_read = _among_readings(table, not_read)
     numbers = _plain_columns(table, columns)
     indices = [column.index for column in numbers.values()]
     decimal = decimal_sign(table, indices, choices.decimal)
     check_signs(table, indices, decimal)
     table, left_out = without_marks(table, numbers, decimal, choices.drop_breaks)
-    if not table.rows:
-        found = "no row with a time, a displacement and a tension, all of them numbers"
-        raise InputError(f"{table.sheet.path}: found {found}, expected readings")
+    _check_some_rows(table)
 
     notes = _whose(table, columns)
     notes.append(_read_as(table, columns, decimal))
@@ -163,20 +167,35 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
     notes += about_rows
     notes += left_out
 
-    texts: dict[Role, list[str]] = {}
-    values: dict[Role, Floats] = {}
-    for role, column in numbers.items():
-        if role != "hold":
-            texts[role] = _numbers(table, column, decimal)
-    for role, text in texts.items():
-        values[role] = _converted(columns[role], text)
-    durations = choices.time_since == "hold"
-    values["time"], of_day = _times(table, columns["time"], values.get("time"), notes, durations=durations)
+    texts = _texts(table, numbers, decimal)
+    values = {role: _converted(columns[role], text) for role, text in texts.items()}
+    of_holds = choices.time_since == "hold"
+    values["time"], of_day = _times(table, columns["time"], values.get("time"), notes, durations=of_holds)
     _check_sizes(table, columns, values)
     values["displacement"] = _from_zero(values["displacement"], choices.zero_mm)
-    notes += unread(table, columns)
     hold, numbering = _hold_numbers(table, columns.get("hold"), decimal)
-    return _from_zero_on(Recorded(table, columns, texts, values, hold, of_day, numbering, not_read), notes)
+    recorded = Recorded(table, columns, texts, values, hold, of_day, numbering, not_read)
+    recorded, used = _with_hold_clock(recorded, choices)
+    notes += unread(table, used)
+    return _from_zero_on(recorded, notes)
+
+
+def _with_hold_clock(recorded: Recorded, choices: Choices) -> tuple[Recorded, list[Column]]:
+    """Times of the test with those of its holds beside them, where the file has both, and the columns that are used."""
+    used = [*recorded.columns.values()]
+    if choices.time_since is not None:
+        return recorded, used
+    both = two_clocks(recorded.table, recorded.columns, choices.mapping, of_day=recorded.of_day)
+    if both is None:
+        return recorded, used
+    values = recorded.values | {"time": both.time_s}
+    return replace(recorded, values=values, of_day=both.of_day, hold_clock=both.of_holds), [*used, both.beside]
+
+
+def _check_some_rows(table: RawTable) -> None:
+    if not table.rows:
+        found = "no row with a time, a displacement and a tension, all of them numbers"
+        raise InputError(f"{table.sheet.path}: found {found}, expected readings")
 
 
 def _first_not_read(table: RawTable, displacement: Column) -> int | None:
@@ -185,6 +204,11 @@ def _first_not_read(table: RawTable, displacement: Column) -> int | None:
         if not row.cell(displacement.index):
             return row.line
     return None
+
+
+def _among_readings(table: RawTable, line: int | None) -> int | None:
+    """A line, unless it stands below the readings."""
+    return line if line in {row.line for row in table.rows} else None
 
 
 def _from_zero_on(recorded: Recorded, notes: list[str]) -> tuple[Recorded, list[str]]:
@@ -271,6 +295,15 @@ def _by_units_alone(columns: Mapping[Role, Column]) -> list[str]:
     length = columns["displacement"].header
     unless = f"if {length} is a diameter or a gauge length, say so with --map {length}=ignore"
     return [f"columns named by units alone: {listed(told)}; {unless}"]
+
+
+def _texts(table: RawTable, columns: Columns, decimal: Decimal) -> dict[Role, list[str]]:
+    """The numbers of each column but that of holds."""
+    texts: dict[Role, list[str]] = {}
+    for role, column in columns.items():
+        if role != "hold":
+            texts[role] = _numbers(table, column, decimal)
+    return texts
 
 
 def _numbers(table: RawTable, column: Column, decimal: Decimal) -> list[str]:

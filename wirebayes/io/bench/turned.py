@@ -6,7 +6,9 @@ each hold has columns of its own, ``Zeit [s]; Kraft [N]``, side by side under th
 """
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from wirebayes.io.bench.block_titles import may_state_a_setting
 from wirebayes.io.bench.cell_units import in_one_unit
@@ -165,10 +167,22 @@ def _across(table: RawTable) -> _Across | None:
     if one_unit is None:
         return None
     unit, numbers = one_unit
-    if len(set(numbers)) < max(FEWEST, len(numbers)):
+    if len(set(numbers)) < FEWEST or not (len(set(numbers)) == len(numbers) or _go_back(role, numbers)):
         return None
     values = dict(zip(measures, numbers, strict=True))
     return _Across(role, unit, values, cells)
+
+
+def _go_back(role: Role, settings: Sequence[str]) -> bool:
+    """Whether settings that stand twice are those of a way back: again in the same order they may be a specimen's."""
+    first: list[str] = []
+    again: list[str] = []
+    for setting in settings:
+        (again if setting in first else first).append(setting)
+    if role == "time" or len(set(again)) < len(again) or any(a == b for a, b in pairwise(settings)):
+        return False
+    forth = [setting for setting in first if setting in again]
+    return again == forth[::-1]
 
 
 def _along_header(unit: str) -> Role | None:

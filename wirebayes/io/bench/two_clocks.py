@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wirebayes.errors import InputError
-from wirebayes.io.bench.clock import is_clock, seconds
+from wirebayes.io.bench.clock import UndecidedDates, is_clock, seconds
 from wirebayes.io.bench.quantities import Unit
 from wirebayes.io.bench.table import RawTable
 from wirebayes.numeric.typing import Floats
@@ -43,6 +43,11 @@ def clock_of(table: RawTable, column: int, unit: Unit | None) -> Clock | None:
     ----------
     unit : Unit or None
         None for clocks and dates.
+
+    Raises
+    ------
+    UndecidedDates
+        Its dates may begin with the day or with the month.
     """
     try:
         if is_clock(table, column, unit):
@@ -50,6 +55,8 @@ def clock_of(table: RawTable, column: int, unit: Unit | None) -> Clock | None:
             return Clock(time_s, _tick_s(time_s))
         cells = [cell.replace(",", ".") for cell in table.column(column)]
         values = np.array([float(cell) for cell in cells])
+    except UndecidedDates:  # to read another column in its place would lose the days
+        raise
     except (InputError, ValueError):
         return None
     places = 0

@@ -1,11 +1,10 @@
 """Columns that are not read: they are named. What a specimen is called."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Sequence
 
 from wirebayes.io.bench.columns import Column
 from wirebayes.io.bench.header import is_copy
-from wirebayes.io.bench.quantities import Role
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.words import plain_letters
 from wirebayes.sentences import listed
@@ -23,24 +22,24 @@ _TITLE = re.compile(
 _PREFIX = 5  # letters of a word that may begin another one, as in Probennummer or SampleID
 
 
-def unread(table: RawTable, columns: Mapping[Role, Column]) -> list[str]:
+def unread(table: RawTable, columns: Sequence[Column]) -> list[str]:
     """Name the columns that are not read, in a sentence; none where everything is read.
 
     Parameters
     ----------
     table : RawTable
-    columns : dict of Role to Column
+    columns : sequence of Column
         Those that are read.
     """
-    read = {column.index for column in columns.values()}
+    read = {column.index for column in columns}
     left = [i for i, name in enumerate(table.header) if name and i not in read and any(table.column(i))]
     names = [repr(table.header[i]) + _same_as(table, i, columns) for i in left]
     return [f"not read: {listed(names)}"] if left else []
 
 
-def _same_as(table: RawTable, index: int, columns: Mapping[Role, Column]) -> str:
+def _same_as(table: RawTable, index: int, columns: Sequence[Column]) -> str:
     """Which of the columns that are read a column repeats."""
-    copied = next((c for c in columns.values() if is_copy(table, index, c.index)), None)
+    copied = next((c for c in columns if is_copy(table, index, c.index)), None)
     return f" (the same numbers as {copied.header!r})" if copied else ""
 
 

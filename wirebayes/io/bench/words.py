@@ -20,7 +20,7 @@ WORDS: dict[Role, tuple[str, ...]] = {
         "verschiebung", "verlangerung", "dehnung", "auslenkung", "deplacement", "allongement", "course",
         "wegaufnehmer", "wegsensor",
         "desplazamiento", "alargamiento", "elongacion", "posicion", "carrera", "spostamento", "allungamento", "corsa",
-        "posizione", "deslocamento", "alongamento", "verplaatsing", "verlenging", "disp", "displ", "ext",
+        "posizione", "traversa", "deslocamento", "alongamento", "verplaatsing", "verlenging", "disp", "displ", "ext",
         "forlangning", "forskjutning", "forskydning", "forskyvning", "forlengelse", "siirtyma", "venyma",
         "posunuti", "prodlouzeni", "uzama",
         "extensometer", "extensometre", "extensometro", "estensimetro", "ekstensometr", "lvdt",
@@ -31,7 +31,7 @@ WORDS: dict[Role, tuple[str, ...]] = {
         "time", "elapsed", "millis", "micros", "seconds", "minutes", "hours", "timestamp", "clock", "stopwatch",
         "zeit", "uhrzeit",
         "zeitpunkt", "sekunden", "minuten", "stunden", "temps", "duree", "heure",
-        "tiempo", "tempo", "hora", "tijd", "czas", "tid", "aika", "cas", "zaman",
+        "tiempo", "tempo", "hora", "ora", "orario", "tijd", "czas", "tid", "aika", "cas", "zaman",
         "время", "時間", "时间", "時刻", "시간",
     ),
     "tension": (
@@ -75,6 +75,11 @@ RIG_WORDS: dict[Role, tuple[str, ...]] = {
 }  # fmt: skip
 # A load or its mass beside the right unit, where no other column is one.
 RIG_LETTERS: dict[Role, tuple[str, ...]] = {"tension": ("p", "w", "m")}
+# What a screw or a motor counts while it moves: how long one is stands in no file.
+COUNTED = {
+    "turn", "turns", "rev", "revs", "revolutions", "rotations", "steps", "counts", "ticks", "umdrehungen", "drehungen",
+    "schritte", "tours", "vueltas", "giri", "voltas", "slagen",
+}  # fmt: skip
 # What stands before a statistic of a column, below its readings.
 STATISTICS = {
     "mean", "average", "avg", "median", "max", "maximum", "min", "minimum", "sum", "total", "std", "stdev", "sd",
