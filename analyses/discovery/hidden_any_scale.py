@@ -1,8 +1,10 @@
 """Hidden effects at any scale: how often does `discover` see and name them, under steps and under weights?
 
 ``python -m analyses.discovery.hidden_any_scale --tests 300``. Lines from thread to mooring rope, held for seconds or
-days and read rarely or often, every second one under weights, each with one hidden effect of the catalogue. The tests
-come from an independent program (`analyses.hidden_effects.scaled_draws`), which also says which names look alike there.
+days and read rarely or often, every second one under weights, each with one hidden effect: in three of five tests one
+that a single test shows, in one of five one that is in no catalogue, and in one of five one that only two lengths of a
+line show, which are then tested both. The tests come from an independent program
+(`analyses.hidden_effects.scaled_draws`), which also says which names look alike there.
 """
 
 from collections import Counter
@@ -13,9 +15,11 @@ from typing import Any
 import numpy as np
 
 from analyses.hidden_effects.rates import rate
-from analyses.hidden_effects.scaled_cases import ScaledCase, group
-from analyses.hidden_effects.scaled_draws import DELTAS, draw_case, draw_hidden
-from analyses.hidden_effects.scaled_law import Hidden
+from analyses.hidden_effects.rig import Array
+from analyses.hidden_effects.scaled_cases import UNKNOWN, ScaledCase, group
+from analyses.hidden_effects.scaled_draws import DELTAS, draw_case_and_hidden
+from analyses.hidden_effects.scaled_law import Hidden, ScaledTest
+from analyses.hidden_effects.scaled_lengths import TwoLengths
 from analyses.resumable import study
 from wirebayes.discovery.search import investigate
 from wirebayes.discovery.settings import Settings
@@ -30,36 +34,49 @@ SIMULATIONS = 199  # refitted data sets behind a p, as in the benchmark of hidde
 FIRST_C = 20.0  # where a temperature is logged
 
 
-def measured(case: ScaledCase, hidden: Hidden, rng: np.random.Generator) -> Experiment:
-    """The test with its readings."""
-    test = case.test
+def measured(case: ScaledCase | TwoLengths, hidden: Hidden, rng: np.random.Generator) -> list[Experiment]:
+    """The test, or those of two lengths, with readings."""
+    if isinstance(case, ScaledCase):
+        return [with_readings(case.test, case.measured(hidden, rng), case.resolution, "line")]
+    readings = case.measured(hidden, rng)
+    tests = zip(case.parts, readings, ("short", "long"), strict=True)
+    return [with_readings(part.test, y, part.resolution, name) for part, y, name in tests]
+
+
+def with_readings(test: ScaledTest, y: Array, resolution: float, name: str) -> Experiment:
+    """A test with its readings, as the package has it."""
     control: Control = "force" if test.weights else "displacement"
     ends = np.cumsum([len(times) for times in test.times_s])[:-1]
-    each = np.split(case.measured(hidden, rng), ends)
     holds = []
-    for j, y in enumerate(each):
+    for j, own in enumerate(np.split(y, ends)):
         logged = None if test.warming_K is None else frozen((FIRST_C + test.warming_K[j]).tolist())
-        times, read = frozen(test.times_s[j].tolist()), frozen(y.tolist())
+        times, read = frozen(test.times_s[j].tolist()), frozen(own.tolist())
         duration, start = float(test.durations_s[j]), float(test.starts_s[j])
         holds.append(Hold(j + 1, float(test.settings[j]), duration, times, read, logged, start, control))
     file = Path("line.toml")
-    return Experiment("line", "line", test.length_mm, case.resolution, tuple(holds), file, control=control)
+    return Experiment(name, "line", test.length_mm, resolution, tuple(holds), file, control=control)
+
+
+def kind_of(index: int) -> str:
+    """Where the effect of a test comes from; of each five pairs of a test by weights and one by steps."""
+    return ("catalogue", "catalogue", "catalogue", "foreign", "lengths")[index // 2 % 5]
 
 
 def one(seed: int, index: int) -> dict[str, Any]:
     """One test: what was hidden, and what the search says; without an effect where none can be large enough."""
     own_seed = seed_of(seed, "hidden at any scale", str(index))
     rng = np.random.default_rng(own_seed)
-    case = draw_case(rng, weights=index % 2 == 0)
-    drawn = draw_hidden(case, rng)
-    row = {"index": index, **case.about}
+    kind = kind_of(index)
+    case, drawn = draw_case_and_hidden(rng, index % 2 == 0, kind)
+    about = case.about if isinstance(case, ScaledCase) else case.parts[0].about
+    row = {"index": index, "kind": kind, **about}
     if drawn is None:
         return row | {"effect": None}
     hidden, delta = drawn
-    test = measured(case, hidden, rng)
-    (found,) = investigate([test], Settings(simulations=SIMULATIONS), own_seed).report["experiments"].values()
+    tests = measured(case, hidden, rng)
+    found = investigate(tests, Settings(simulations=SIMULATIONS), own_seed).report["experiments"]
     truth = {"effect": hidden.name, "amplitude": hidden.amplitude, "delta": delta}
-    return row | truth | {"group": list(group(case, hidden, delta)), **answered(found)}
+    return row | truth | {"group": list(group(case, hidden, delta)), **answered(found[tests[0].name])}
 
 
 def answered(found: ExperimentFindings) -> dict[str, Any]:
@@ -68,8 +85,9 @@ def answered(found: ExperimentFindings) -> dict[str, Any]:
 
 
 def is_right(row: dict[str, Any]) -> bool:
-    """Whether a name that the answer gives is the effect's or one that looks alike."""
-    return bool(set(row["effects"]) & set(row["group"]))
+    """Whether a name that the answer gives is the effect's or one that looks alike; of what has no name, that."""
+    unnamed = {UNKNOWN} if row["verdict"] == "unknown" else set()
+    return bool((set(row["effects"]) | unnamed) & set(row["group"]))
 
 
 def is_wrong(row: dict[str, Any]) -> bool:
@@ -118,6 +136,9 @@ def kinds_of(rows: Sequence[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
         "rests": [row for row in rows if row["rests"]],
         "few readings": [row for row in rows if row["readings"] == "few"],
         "many readings": [row for row in rows if row["readings"] == "many"],
+        "one length, an effect of the catalogue": [row for row in rows if row["kind"] == "catalogue"],
+        "one length, an effect in no catalogue": [row for row in rows if row["kind"] == "foreign"],
+        "two lengths": [row for row in rows if row["kind"] == "lengths"],
     }
 
 

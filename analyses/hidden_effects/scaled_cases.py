@@ -68,6 +68,22 @@ KINDS = {
     "guide_friction": Kind(_BOTH, 0.2),
     "clamp_transient": Kind(_BOTH, 0.2),
 }
+# what only two lengths of a line show
+OF_LENGTHS = {"fixture_compliance": Kind(_UP, 1.0, "compliance"), "length_dependence": Kind(_BOTH, 1.0)}
+# in no catalogue
+FOREIGN = {
+    "yield": Kind(_UP, 0.7),
+    "hold_softening": Kind(_UP, 0.5, "1/test"),
+    "log_creep": Kind(_UP, 1.0),
+    "exponent_by_tension": Kind(_BOTH, 0.3),
+    "worn_thread": Kind(_UP, 0.5, "move"),
+    "gain_step": Kind(_BOTH, 0.3),
+    "zero_step": Kind(_BOTH, 0.3, "reading"),
+    "wave": Kind(_UP, 0.2, "reading"),
+    "passing_draught": Kind(_BOTH, 0.2, "reading"),
+}
+EVERY = KINDS | OF_LENGTHS | FOREIGN
+UNKNOWN = "unknown"  # what is said of an effect that is in no catalogue
 
 
 @dataclass(frozen=True)
@@ -102,74 +118,35 @@ class _Guess:
         return _Guess(after, low, high, power, (share, size))
 
 
-@dataclass(frozen=True)
-class ScaledCase:
-    """A test of a line, its truth and noise.
-
-    Attributes
-    ----------
-    test : ScaledTest
-    truth : dict
-        ``k1 B U k2 N preload``.
-    sensor_sd, setting_sd, resolution : float
-        In the units of what is read and of what is set.
-    about : dict
-        What kind of test it is.
-    """
-
-    test: ScaledTest
-    truth: dict[str, float]
-    sensor_sd: float
-    setting_sd: float
-    resolution: float
-    about: dict[str, Any]
+class Signatures:
+    """What effects do to readings, and how large they are beside the noise and what parameters can absorb."""
 
     def noise_free(self, hidden: Hidden = Hidden()) -> Array:  # noqa: B008 - it is frozen
         """Readings without noise."""
-        return readings(self.test, self.truth, hidden, np.zeros(len(self.test.settings)))
+        raise NotImplementedError
 
-    @cached_property
-    def plain(self) -> Array:
-        """The same without an effect."""
-        return self.noise_free()
-
-    def measured(self, hidden: Hidden, rng: np.random.Generator) -> Array:
-        """Readings with noise."""
-        errors = self.setting_sd * rng.standard_normal(len(self.test.settings))
-        y = readings(self.test, self.truth, hidden, errors)
-        y = y + self.sensor_sd * rng.standard_normal(len(y))
-        return np.round(y / self.resolution) * self.resolution if self.resolution else y
-
-    @cached_property
-    def _metric(self) -> tuple[Array, Array]:
-        """Cholesky factor of the covariance, and a basis of what parameters can absorb, whitened."""
-        by_error = np.stack([self._by_error(j) for j in range(len(self.test.settings))], axis=1)
-        variance = self.sensor_sd**2 + self.resolution**2 / 12.0
-        v = variance * np.eye(len(by_error)) + self.setting_sd**2 * by_error @ by_error.T
-        factor = np.linalg.cholesky(v)
-        columns = solve_triangular(factor, np.stack([self._by(name) for name in PLAIN], axis=1), lower=True)
-        left, sizes, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
-        return np.asarray(factor, np.float64), np.asarray(left[:, sizes > 1e-7 * sizes[0]], np.float64)
-
-    def _by_error(self, j: int) -> Array:
-        step = _DIFFERENCE * float(np.abs(self.test.settings).mean())
-        up = step * np.eye(len(self.test.settings))[j]
-        above, below = (readings(self.test, self.truth, Hidden(), errors) for errors in (up, -up))
-        return np.asarray((above - below) / (2.0 * step))
-
-    def _by(self, name: str) -> Array:
-        step = _DIFFERENCE * (self.about["stretch_mm"] if name == "preload" else self.truth[name])
-        up, down = (replace(self, truth=self.truth | {name: self.truth[name] + d}) for d in (step, -step))
-        return (up.plain - down.plain) / (2.0 * step)
+    def largest(self, name: str) -> float:
+        """Largest sensible amplitude of an effect."""
+        raise NotImplementedError
 
     def whitened(self, dy: Array) -> Array:
         """Readings in standard deviations of the noise, which are independent."""
-        return np.asarray(solve_triangular(self._metric[0], dy, lower=True, check_finite=False))
+        raise NotImplementedError
+
+    @cached_property
+    def basis(self) -> Array:
+        """Orthonormal columns, whitened, of what parameters can absorb."""
+        raise NotImplementedError
+
+    @cached_property
+    def plain(self) -> Array:
+        """Readings without noise and without an effect."""
+        return self.noise_free()
 
     def projected(self, dy: Array) -> Array:
         """The same less what the plain parameters can absorb."""
-        z, basis = self.whitened(dy), self._metric[1]
-        return np.asarray(z - basis @ (basis.T @ z))
+        z = self.whitened(dy)
+        return np.asarray(z - self.basis @ (self.basis.T @ z))
 
     def signature(self, hidden: Hidden) -> Array:
         """What an effect does to the readings, projected."""
@@ -179,29 +156,6 @@ class ScaledCase:
         """Size of an effect; infinite where the wire cannot carry its weights with it."""
         size = float(np.linalg.norm(self.signature(hidden)))
         return size if np.isfinite(size) else np.inf
-
-    def largest(self, name: str) -> float:
-        """Largest sensible amplitude of an effect."""
-        test, kind = self.test, KINDS[name]
-        moves = np.abs(np.diff(test.settings, prepend=0.0))
-        hold_s = float(np.median(test.durations_s))
-        move = float(np.median(moves[moves > 0]))
-        if test.weights:
-            move *= test.length_mm / self.truth["k1"]
-        tension = test.tension_ref_N
-        units = {
-            "": 1.0,
-            "1/strain": self.truth["k1"] / tension,
-            "move": move,
-            "hold": hold_s,
-            "move/tension": move / tension,
-            "move/tension/hold": move / tension / hold_s,
-            "tension": tension,
-            "gap": min(float(t[1] - t[0]) for t in test.times_s),
-            "reading/hold": float(np.median(np.abs(self.plain))) / hold_s,
-            "1/reading": 1.0 / float(np.abs(self.plain).max()),
-        }
-        return kind.largest * units[kind.unit]
 
     def of_delta(self, hidden: Hidden, delta: float, agrees: float = 0.02) -> Hidden | None:
         """The effect with an amplitude of that size; none where no sensible one has it.
@@ -227,7 +181,106 @@ class ScaledCase:
         return None
 
     def shown(self) -> list[str]:
-        """Effects that such a test could show."""
+        """Effects of the catalogue that these readings could show."""
+        raise NotImplementedError
+
+    def forms(self, name: str, rng: np.random.Generator | None = None) -> Iterator[Hidden]:
+        """An effect with each sign and several values of its constants, or one drawn at random; without its size."""
+        raise NotImplementedError
+
+
+def basis_of(columns: Array) -> Array:
+    """Orthonormal columns that span those of (N, p) that can be told apart."""
+    left, sizes, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
+    return np.asarray(left[:, sizes > 1e-7 * sizes[0]], np.float64)
+
+
+@dataclass(frozen=True)
+class ScaledCase(Signatures):
+    """A test of a line, its truth and noise.
+
+    Attributes
+    ----------
+    test : ScaledTest
+    truth : dict
+        ``k1 B U k2 N preload``.
+    sensor_sd, setting_sd, resolution : float
+        In the units of what is read and of what is set.
+    about : dict
+        What kind of test it is.
+    """
+
+    test: ScaledTest
+    truth: dict[str, float]
+    sensor_sd: float
+    setting_sd: float
+    resolution: float
+    about: dict[str, Any]
+
+    def noise_free(self, hidden: Hidden = Hidden()) -> Array:  # noqa: B008 - it is frozen
+        """Readings without noise."""
+        return readings(self.test, self.truth, hidden, np.zeros(len(self.test.settings)))
+
+    def measured(self, hidden: Hidden, rng: np.random.Generator) -> Array:
+        """Readings with noise."""
+        errors = self.setting_sd * rng.standard_normal(len(self.test.settings))
+        y = readings(self.test, self.truth, hidden, errors)
+        y = y + self.sensor_sd * rng.standard_normal(len(y))
+        return np.round(y / self.resolution) * self.resolution if self.resolution else y
+
+    @cached_property
+    def _factor(self) -> Array:
+        """Cholesky factor of the covariance."""
+        by_error = np.stack([self._by_error(j) for j in range(len(self.test.settings))], axis=1)
+        variance = self.sensor_sd**2 + self.resolution**2 / 12.0
+        v = variance * np.eye(len(by_error)) + self.setting_sd**2 * by_error @ by_error.T
+        return np.asarray(np.linalg.cholesky(v), np.float64)
+
+    @cached_property
+    def basis(self) -> Array:
+        return basis_of(np.stack([self.whitened(self.by(name)) for name in PLAIN], axis=1))
+
+    def _by_error(self, j: int) -> Array:
+        step = _DIFFERENCE * float(np.abs(self.test.settings).mean())
+        up = step * np.eye(len(self.test.settings))[j]
+        above, below = (readings(self.test, self.truth, Hidden(), errors) for errors in (up, -up))
+        return np.asarray((above - below) / (2.0 * step))
+
+    def by(self, name: str) -> Array:
+        """Readings by one parameter."""
+        step = _DIFFERENCE * (self.about["stretch_mm"] if name == "preload" else self.truth[name])
+        up, down = (replace(self, truth=self.truth | {name: self.truth[name] + d}) for d in (step, -step))
+        return (up.plain - down.plain) / (2.0 * step)
+
+    def whitened(self, dy: Array) -> Array:
+        return np.asarray(solve_triangular(self._factor, dy, lower=True, check_finite=False))
+
+    def largest(self, name: str) -> float:
+        test, kind = self.test, EVERY[name]
+        moves = np.abs(np.diff(test.settings, prepend=0.0))
+        hold_s = float(np.median(test.durations_s))
+        move = float(np.median(moves[moves > 0]))
+        if test.weights:
+            move *= test.length_mm / self.truth["k1"]
+        tension = test.tension_ref_N
+        units = {
+            "": 1.0,
+            "1/strain": self.truth["k1"] / tension,
+            "move": move,
+            "hold": hold_s,
+            "move/tension": move / tension,
+            "move/tension/hold": move / tension / hold_s,
+            "tension": tension,
+            "gap": min(float(t[1] - t[0]) for t in test.times_s),
+            "reading/hold": float(np.median(np.abs(self.plain))) / hold_s,
+            "1/reading": 1.0 / float(np.abs(self.plain).max()),
+            "reading": float(np.median(np.abs(self.plain))),
+            "compliance": test.length_mm / self.truth["k1"],
+            "1/test": 1.0 / len(test.settings),
+        }
+        return kind.largest * units[kind.unit]
+
+    def shown(self) -> list[str]:
         back = bool(np.any(np.diff(self.test.settings) < 0))
         out = []
         for name in KINDS:
@@ -242,15 +295,20 @@ class ScaledCase:
             out.append(name)
         return out
 
+    def foreign(self) -> list[str]:
+        """Effects in no catalogue that such a test could show; under weights a step of the gauge's zero is a slip."""
+        return [name for name in FOREIGN if not (self.test.weights and name in ("worn_thread", "zero_step"))]
+
     def forms(self, name: str, rng: np.random.Generator | None = None) -> Iterator[Hidden]:
-        """An effect with each sign and several values of its constants, or one drawn at random; without its size."""
         axes = self._axes(name, rng)
-        signs = KINDS[name].signs if rng is None else (int(rng.choice(KINDS[name].signs)),)
+        signs = EVERY[name].signs if rng is None else (int(rng.choice(EVERY[name].signs)),)
         for sign, *values in product(signs, *axes.values()):
             yield Hidden(name, float(sign), dict(zip(axes, values, strict=True)))
 
     def _axes(self, name: str, rng: np.random.Generator | None) -> dict[str, list[float]]:
         test, hold_s = self.test, float(np.median(self.test.durations_s))
+        if name in FOREIGN:
+            return self._foreign_axes(name, rng)
         if name in ("grip_slip", "unrecorded_hold"):
             return {"hold": _chosen(np.arange(2.0, len(test.settings) - 1), rng)}
         if name == "second_relaxation":
@@ -268,6 +326,34 @@ class ScaledCase:
             }
         return {}
 
+    def _foreign_axes(self, name: str, rng: np.random.Generator | None) -> dict[str, list[float]]:
+        test, hold_s = self.test, float(np.median(self.test.durations_s))
+        most, whole_s = float(test.settings.max()), float(test.durations_s.sum())
+        if name in ("gain_step", "zero_step"):
+            return {"hold": _chosen(np.arange(2.0, len(test.settings) - 1), rng)}
+        if name == "yield":
+            strain = most / (self.truth["k1"] if test.weights else test.length_mm)
+            return {"strain": _between(0.35 * strain, 0.65 * strain, rng)}
+        if name == "log_creep":
+            return {"onset_s": _between(0.01 * hold_s, 0.25 * hold_s, rng), "long_s": [2.5 * hold_s]}
+        if name == "worn_thread":
+            step = float(np.median(np.abs(np.diff(test.settings))))
+            return {
+                "centre": _between(0.3 * most, 0.7 * most, rng),
+                "width": _between(0.5 * step, 1.2 * step, rng),
+            }
+        if name == "wave":
+            return {
+                "period_s": _between(1.4 * hold_s, 7.0 * hold_s, rng),
+                "phase": _chosen(np.arange(0.3, 6.2, 1.0), rng),
+            }
+        if name == "passing_draught":
+            return {
+                "centre": _between(0.2 * whole_s, 0.8 * whole_s, rng),
+                "width": _between(0.3 * hold_s, 1.2 * hold_s, rng),
+            }
+        return {}
+
 
 def _chosen(values: Array, rng: np.random.Generator | None) -> list[float]:
     return [float(v) for v in values] if rng is None else [float(rng.choice(values))]
@@ -278,10 +364,13 @@ def _between(low: float, high: float, rng: np.random.Generator | None, count: in
     return [float(low * (high / low) ** share) for share in shares]
 
 
-def group(case: ScaledCase, hidden: Hidden, delta: float) -> dict[str, float]:
-    """Names that look like the effect in this test, each with the largest |cos| to it."""
+def group(case: Signatures, hidden: Hidden, delta: float) -> dict[str, float]:
+    """Names that look like the effect in this test, each with the largest |cos| to it.
+
+    Of one in no catalogue that is what has no name, and the names that look like it.
+    """
     own = case.signature(hidden)
-    alike = {hidden.name: 1.0}
+    alike = {UNKNOWN if hidden.name in FOREIGN else hidden.name: 1.0}
     for name in case.shown():
         if name == hidden.name:
             continue

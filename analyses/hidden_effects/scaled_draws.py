@@ -6,13 +6,15 @@ often; a test may rest before each move, go part of the way back, log a temperat
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .rig import Array
-from .scaled_cases import ScaledCase
+from .scaled_cases import OF_LENGTHS, ScaledCase, Signatures
 from .scaled_law import Hidden, ScaledTest
+from .scaled_lengths import TwoLengths
 
 DELTAS = (5.0, 8.0, 12.0)
 _TRIES = 40  # draws of an effect, of which one can be as large as it should
@@ -23,9 +25,23 @@ _REST = 1.4  # of a hold, until the next move, where the wire rests before it
 def draw_case(rng: np.random.Generator, weights: bool) -> ScaledCase:
     """A line and its test, drawn again while the wire goes slack or creeps as far as it is stretched."""
     while True:
-        case = _draw(rng, weights)
-        if weights or case.plain.min() > 0.05 * case.test.tension_ref_N:
+        case = _tested(_line(rng), rng, weights)
+        if _is_taut(case):
             return case
+
+
+def draw_lengths(rng: np.random.Generator, weights: bool) -> TwoLengths:
+    """Two tests of one line, of which one specimen is longer than the other."""
+    while True:
+        line = _line(rng)
+        longer = line.times_as_long(float(rng.uniform(1.5, 3.0)))
+        both = (_tested(line, rng, weights), _tested(longer, rng, weights))
+        if all(_is_taut(case) for case in both):
+            return TwoLengths(both)
+
+
+def _is_taut(case: ScaledCase) -> bool:
+    return case.test.weights or bool(case.plain.min() > 0.05 * case.test.tension_ref_N)
 
 
 @dataclass(frozen=True)
@@ -37,6 +53,11 @@ class _Line:
     tension_N: float
     stretch_mm: float
     hold_s: float
+
+    def times_as_long(self, ratio: float) -> _Line:
+        """A longer specimen, which creeps in proportion."""
+        truth = self.truth | {"B": ratio * self.truth["B"]}
+        return replace(self, truth=truth, length_mm=ratio * self.length_mm, stretch_mm=ratio * self.stretch_mm)
 
 
 def _line(rng: np.random.Generator) -> _Line:
@@ -63,8 +84,7 @@ def _settings(rng: np.random.Generator, low: float, high: float) -> tuple[Array,
     return settings, step, back
 
 
-def _draw(rng: np.random.Generator, weights: bool) -> ScaledCase:
-    line = _line(rng)
+def _tested(line: _Line, rng: np.random.Generator, weights: bool) -> ScaledCase:
     unit, low, high = (line.tension_N, 0.4, 1.6) if weights else (line.stretch_mm, 0.3, 1.8)
     settings, step, back = _settings(rng, low, high)
     few_or_many = str(rng.choice(["few", "usual", "many"]))
@@ -111,13 +131,40 @@ def _warming(rng: np.random.Generator, durations: Array, times: tuple[Array, ...
     return tuple(of_hold - logged[0][0] for of_hold in logged)
 
 
-def draw_hidden(case: ScaledCase, rng: np.random.Generator) -> tuple[Hidden, float] | None:
-    """An effect of a size, none more often than another; none where no try was large enough."""
+def draw_hidden(case: Signatures, rng: np.random.Generator, names: Sequence[str] = ()) -> tuple[Hidden, float] | None:
+    """An effect of a size, none more often than another; none where no try was large enough.
+
+    Parameters
+    ----------
+    case : Signatures
+    rng : numpy.random.Generator
+    names : sequence of str
+        Effects to draw from; those of the catalogue that the readings can show when left out.
+    """
     delta = float(rng.choice(DELTAS))
-    names = case.shown()
+    names = names or case.shown()
     for _ in range(_TRIES):
         (form,) = case.forms(str(rng.choice(names)), rng)
         found = case.of_delta(form, delta)
         if found is not None:
             return found, delta
     return None
+
+
+def draw_case_and_hidden(
+    rng: np.random.Generator, weights: bool, kind: str
+) -> tuple[ScaledCase | TwoLengths, tuple[Hidden, float] | None]:
+    """A case and what is hidden in it.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    weights : bool
+    kind : {"catalogue", "foreign", "lengths"}
+        Of the effect: one that a single test shows, one in no catalogue, or one that only two lengths show.
+    """
+    if kind == "lengths":
+        pair = draw_lengths(rng, weights)
+        return pair, draw_hidden(pair, rng, tuple(OF_LENGTHS))
+    case = draw_case(rng, weights)
+    return case, draw_hidden(case, rng, case.foreign() if kind == "foreign" else ())

@@ -1,7 +1,8 @@
 """One wire under steps or under weights with one hidden effect, at any scale: readings without noise.
 
 Written from the formulas of the documentation alone, for one truth at a time; nothing of the package is used. Under
-weights the same law is solved for the length, and effects act as the table of `docs/theory.rst` says.
+weights the same law is solved for the length, and effects act as the table of `docs/theory.rst` says. Effects that are
+in no catalogue have a formula here only.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from scipy.optimize import brentq
 
 from .rig import Array
 
-STRAIN_BENT = ("strain_stiffening", "toe", "power_strain")
+STRAIN_BENT = ("strain_stiffening", "toe", "power_strain", "yield")
 
 
 @dataclass(frozen=True)
@@ -134,9 +135,10 @@ class _Test:
             end = float(test.durations_s[j] + hidden.of("late_clock"))
             natural = self._natural(j, self._pass(crept, j, held, times, end), self._warming(j))
             if test.weights:
-                shown.append(self._stretched(held, natural) - self.base)
+                shown.append(self._stretched(j, held, natural) - self.base)
             else:
-                shown.append(self._tension(held, natural) * (1.0 + hidden.of("guide_friction") * test.directions[j]))
+                tension = self._tension(j, held, natural)
+                shown.append(tension * (1.0 + hidden.of("guide_friction") * test.directions[j]))
         if test.weights:
             shown = self._gauge_with_play(shown)
         return np.concatenate([self._instrument(j, y) for j, y in enumerate(shown)])
@@ -156,6 +158,8 @@ class _Test:
         if hidden.name == "screw_error":
             turns = 2.0 * np.pi * at / hidden.shapes["period"] + hidden.shapes["phase"]
             x = x + hidden.amplitude * np.cos(turns)
+        if hidden.name == "worn_thread":
+            x = x + hidden.amplitude * _bump(at, hidden.shapes)
         if hidden.name == "lost_motion":
             carriage = x[0]
             for j in range(1, len(x)):
@@ -193,16 +197,25 @@ class _Test:
         if hidden.name == "power_strain":
             typical = self.test.tension_ref_N / self.k1
             s = typical * (s / typical) ** (1.0 + hidden.amplitude)
+        if hidden.name == "yield":
+            s = s - hidden.amplitude * np.maximum(s - hidden.shapes["strain"], 0.0)
         return s * (1.0 + hidden.of("strain_stiffening") * s)
 
-    def _tension(self, stretched: float, natural: Array) -> Array:
-        return np.maximum(self.k1 * self._pulls(stretched / natural - 1.0, natural), 0.0)
+    def _stiffness(self, j: int) -> float:
+        """k1, which falls from hold to hold where the wire softens."""
+        return self.k1 * (1.0 - self.hidden.of("hold_softening") * j)
 
-    def _stretched(self, tension: float, natural: Array) -> Array:
-        """Stretched length that carries a tension."""
-        wanted = tension / self.k1
+    def _tension(self, j: int, stretched: float, natural: Array) -> Array:
+        """Tension of a stretched length; of S less c times the tension where the bench gives way, solved for it."""
+        k1 = self._stiffness(j)
+        pulled = k1 * self._pulls(stretched / natural - 1.0, natural)
+        return np.maximum(pulled / (1.0 + self.hidden.of("fixture_compliance") * k1 / natural), 0.0)
+
+    def _stretched(self, j: int, tension: float, natural: Array) -> Array:
+        """Stretched length that carries a tension, and how far the bench gives way."""
+        wanted = tension / self._stiffness(j)
         if self.hidden.name not in STRAIN_BENT:
-            return natural * (1.0 + wanted)
+            return natural * (1.0 + wanted) + self.hidden.of("fixture_compliance") * tension
         return np.array([length * (1.0 + self._strain_for(wanted, length)) for length in natural])
 
     def _strain_for(self, wanted: float, length: float) -> float:
@@ -220,7 +233,7 @@ class _Test:
         """Let a hold pass; elongation by creep at its times."""
         hidden = self.hidden
         natural = self._natural(j, np.array([crept.total]), self._warming(j, slice(1)))
-        tension = held if self.test.weights else float(self._tension(held, natural)[0])
+        tension = held if self.test.weights else float(self._tension(j, held, natural)[0])
         driving = max(tension - hidden.of("creep_threshold"), 0.0)
         goal = self.B * driving**self.U
         amount = (goal - (1.0 - hidden.of("permanent_creep")) * crept.main) * (1.0 + j) ** -hidden.of("ageing")
@@ -237,11 +250,17 @@ class _Test:
     ) -> Callable[[Array], tuple[Array, Array, Array, Array]]:
         """The parts of the creep as functions of the time in a hold."""
         hidden, before = self.hidden, (crept.main, crept.second, crept.flow)
+        ratio = float(np.clip(tension / self.test.tension_ref_N, 0.01, 100.0))
+        exponent = self.N * float(np.clip(1.0 + hidden.of("exponent_by_tension") * np.log(ratio), 0.3, 2.0))
         clocks, begun = [*crept.clocks, (crept.now_s, goal - crept.goal)], crept.now_s
 
         def at(t: Array) -> tuple[Array, Array, Array, Array]:
             main, second, flow = (part + 0.0 * t for part in before)
-            main = main + amount * -np.expm1(-rate * t**self.N)
+            reached = -np.expm1(-rate * t**exponent)
+            if hidden.name == "log_creep":
+                onset_s, long_s = hidden.shapes["onset_s"], hidden.shapes["long_s"]
+                reached = reached + hidden.amplitude * (np.log1p(t / onset_s) / np.log1p(long_s / onset_s) - reached)
+            main = main + amount * reached
             flowed = hidden.of("steady_creep") * tension * t
             if hidden.shapes.get("carried"):
                 main = main + flowed
@@ -264,4 +283,18 @@ class _Test:
         if hidden.name == "clamp_transient":
             y = y * (1.0 + hidden.amplitude * np.exp(-times / hidden.shapes["time_s"]))
         y = y * (1.0 + hidden.of("sensor_nonlinearity") * y)
-        return np.asarray(y + hidden.of("sensor_drift") * (self.test.starts_s[j] + times))
+        clock_s = self.test.starts_s[j] + times
+        if hidden.name in ("gain_step", "zero_step") and j >= int(hidden.shapes["hold"]):
+            y = y * (1.0 + hidden.of("gain_step")) + hidden.of("zero_step")
+        if hidden.name == "wave":
+            y = y + hidden.amplitude * np.sin(
+                2.0 * np.pi * clock_s / hidden.shapes["period_s"] + hidden.shapes["phase"]
+            )
+        if hidden.name == "passing_draught":
+            y = y + hidden.amplitude * _bump(clock_s, hidden.shapes)
+        return np.asarray(y + hidden.of("sensor_drift") * clock_s)
+
+
+def _bump(at: Array, shapes: dict[str, float]) -> Array:
+    """One at its centre, nothing far from it."""
+    return np.asarray(np.exp(-0.5 * ((at - shapes["centre"]) / shapes["width"]) ** 2))

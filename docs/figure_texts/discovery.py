@@ -41,9 +41,8 @@ def false_alarms_at_any_scale(kept: dict[str, Any]) -> str:
 def hidden_effects_at_any_scale(kept: dict[str, Any]) -> str:
     """A paragraph and a table on hidden effects in tests of any scale."""
     found = kept["result"]
-    kinds = {"all": "all tests", "steps": "steps", "weights": "weights", "rests": "with recorded rests"}
-    kinds |= {kind: kind for kind in ("few readings", "many readings")}
-    rows = {words: found["kinds"][kind] for kind, words in kinds.items()}
+    words = {"all": "all tests", "rests": "with recorded rests"}
+    rows = {words.get(kind, kind): rates for kind, rates in found["kinds"].items()}
     rows |= {f"δ = {delta}": rates for delta, rates in found["by_delta"].items()}
     missed = ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in found["missed"].items())
     wrong = "; ".join(f"{_spoken(names)} for {effect.replace('_', ' ')}" for effect, names in found["misnamed"])
@@ -57,9 +56,9 @@ def hidden_effects_at_any_scale(kept: dict[str, Any]) -> str:
         "of these: a right name is given, %",
         "a wrong name is given, %",
     )
-    for words, rates in rows.items():
+    for kind, rates in rows.items():
         cells = [_share(rates[of]) for of in ("detected", "best", "named", "wrong")]
-        lines += table_row(words, rates["tests"], *cells)
+        lines += table_row(kind, rates["tests"], *cells)
     return "\n".join(lines) + "\n"
 
 

@@ -1,14 +1,19 @@
 """Hidden effects at any scale: the independent law against the package's, sizes as asked for, names that look alike."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from analyses.hidden_effects.scaled_cases import KINDS, group
-from analyses.hidden_effects.scaled_draws import DELTAS, draw_case, draw_hidden
+from analyses.discovery.hidden_any_scale import is_right, is_wrong, kind_of, kinds_of, measured
+from analyses.hidden_effects.scaled_cases import FOREIGN, KINDS, OF_LENGTHS, group
+from analyses.hidden_effects.scaled_draws import DELTAS, draw_case, draw_case_and_hidden, draw_hidden, draw_lengths
 from analyses.hidden_effects.scaled_law import Hidden, ScaledTest, readings
+from analyses.hidden_effects.scaled_lengths import DEPENDENT
 from wirebayes.effects import effect_named
+from wirebayes.wire.effect import Amplitude, Effect
 from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import simulate
@@ -47,17 +52,24 @@ OF_STEPS = [
 ]
 
 
-def both_programs(weights: bool, key: str, own: dict[str, float], shapes: dict[str, float]) -> tuple[np.ndarray, ...]:
-    """Readings with the effect by both, and without it."""
+def both_programs(
+    weights: bool,
+    key: str,
+    own: dict[str, float],
+    shapes: dict[str, float],
+    effect: Effect | None = None,
+    truth: dict[str, float] = TRUTH,
+) -> tuple[np.ndarray, ...]:
+    """Readings with the effect by both, and without it; of one in no catalogue as a user would add it."""
     settings = 0.5 * PATH if weights else PATH
     warming = np.array([np.linspace(0.0, 1.0, len(TIMES)) + 0.5 * j for j in range(HOLDS)])
     lasting = np.full(HOLDS, 130.0)
     test = ScaledTest(weights, 1000.0, settings, (TIMES,) * HOLDS, lasting, tuple(warming), 1.0)
     none = np.zeros(HOLDS)
     hidden = Hidden(key.split("@")[0], next(iter(own.values())), shapes)
-    here, plain = (readings(test, TRUTH, effect, none) for effect in (hidden, Hidden()))
-    effect = effect_named(key)
-    columns = {name: np.array([value]) for name, value in TRUTH.items()}
+    here, plain = (readings(test, truth, effect, none) for effect in (hidden, Hidden()))
+    effect = effect or effect_named(key)
+    columns = {name: np.array([value]) for name, value in truth.items()}
     columns |= {f"{effect.name}.{name}": np.array([value]) for name, value in own.items()}
     times, read = np.tile(TIMES, (HOLDS, 1)), np.ones((HOLDS, len(TIMES)), bool)
     control = "force" if weights else "displacement"
@@ -91,8 +103,155 @@ def test_so_it_does_of_what_only_steps_show(key, own, shapes):
     assert here == pytest.approx(there, rel=1e-9, abs=1e-11)
 
 
+def foreign(name, place, formula):
+    """An effect of the user's own, of one amplitude."""
+
+    class Own(Effect):
+        amplitudes = (Amplitude("a", "-", 0.0, stats.norm(0.0, 1.0)),)
+        scope, sentence = "environment", "Of the user's own."
+
+        def apply(self, value, own, hold):
+            return formula(value, own["a"], hold)
+
+    Own.name, Own.place = name, place
+    return Own()
+
+
+def bump(at, centre, width):
+    return np.exp(-0.5 * ((at - centre) / width) ** 2)
+
+
+def clock_s(hold):
+    return hold.start_s + hold.time_s
+
+
+IN_NO_CATALOGUE = {
+    "yield": (0.4, {"strain": 0.003}, "strain", lambda s, a, hold: s - a * np.maximum(s - 0.003, 0.0)),
+    "hold_softening": (0.03, {}, "strain", lambda s, a, hold: s * (1.0 - a * hold.index)),
+    "log_creep": (
+        0.5,
+        {"onset_s": 10.0, "long_s": 300.0},
+        "fraction",
+        lambda phi, a, hold: (1.0 - a) * phi + a * np.log1p(hold.time_s / 10.0) / np.log1p(30.0),
+    ),
+    "exponent_by_tension": (
+        0.2,
+        {},
+        "clock",
+        lambda t, a, hold: t ** (1.0 + a * np.log(hold.initial_tension / hold.tension_ref_N)),
+    ),
+    "worn_thread": (
+        0.2,
+        {"centre": 3.2, "width": 0.7},
+        "position",
+        lambda x, a, hold: x + a * bump(hold.displacement_mm, 3.2, 0.7),
+    ),
+    "gain_step": (0.05, {"hold": 3.0}, "reading", lambda y, a, hold: y * (1.0 + a * (hold.index >= 3))),
+    "zero_step": (0.05, {"hold": 3.0}, "reading", lambda y, a, hold: y + a * (hold.index >= 3)),
+    "wave": (
+        0.05,
+        {"period_s": 400.0, "phase": 0.4},
+        "reading",
+        lambda y, a, hold: y + a * np.sin(2.0 * np.pi * clock_s(hold) / 400.0 + 0.4),
+    ),
+    "passing_draught": (
+        0.05,
+        {"centre": 500.0, "width": 90.0},
+        "reading",
+        lambda y, a, hold: y + a * bump(clock_s(hold), 500.0, 90.0),
+    ),
+}
+
+
+# there is no screw under weights
+OF_NO_CATALOGUE = [*product([False], IN_NO_CATALOGUE), *product([True], set(IN_NO_CATALOGUE) - {"worn_thread"})]
+
+
+@pytest.mark.parametrize(("weights", "name"), sorted(OF_NO_CATALOGUE))
+def test_an_effect_in_no_catalogue_is_what_a_user_would_write(weights, name):
+    size, shapes, place, formula = IN_NO_CATALOGUE[name]
+    here, there, plain = both_programs(weights, name, {"a": size}, shapes, foreign(name, place, formula))
+    assert np.abs(here - plain).max() > 1e-3
+    assert here == pytest.approx(there, rel=1e-9, abs=1e-11)
+
+
+@pytest.mark.parametrize("weights", [False, True], ids=["steps", "weights"])
+def test_a_bench_that_gives_way_does_so_in_proportion_to_the_tension(weights):
+    """The package divides by the sample's length, the law by the wire's: they differ by the strain of its creep."""
+    own = ("fixture_compliance", {"c": 0.2}, {})
+    here, there, plain = both_programs(weights, *own, truth=TRUTH | {"B": 0.0})
+    assert np.abs(here - plain).max() > 1e-2
+    assert here == pytest.approx(there, rel=1e-9, abs=1e-11)
+    here, there, plain = both_programs(weights, *own)
+    assert np.abs(here - there).max() < 2e-3 * np.abs(here - plain).max()
+
+
+@pytest.mark.parametrize("which", range(len(DEPENDENT)))
+@pytest.mark.parametrize("weights", [False, True], ids=["steps", "weights"])
+def test_a_parameter_depends_on_the_length_as_in_the_package(weights, which):
+    pair = draw_lengths(np.random.default_rng(5), weights)
+    hidden = Hidden("length_dependence", 0.4, {"which": float(which)})
+    (first, second) = measured(pair, hidden, np.random.default_rng(1))
+    reference = np.sqrt(first.length_mm * second.length_mm)
+    effect = effect_named(f"length_dependence@{DEPENDENT[which]}")
+    read = []
+    for part, test in zip(pair.parts, (first, second), strict=True):
+        columns = {name: np.array([value]) for name, value in part.truth.items()}
+        columns |= {"length_dependence.p": np.array([0.4])}
+        protocol = test.protocol()
+        model = Model(effects=(effect,), tension_ref_N=1.0, length_ref_mm=float(reference))
+        read.append(simulate(protocol, columns, model)[..., 0][protocol.mask])
+    assert np.concatenate(read) == pytest.approx(pair.noise_free(hidden), rel=1e-9, abs=1e-11)
+    assert pair.delta(hidden) > 0.0
+
+
+def test_creep_of_the_longer_specimen_is_in_proportion_and_what_is_of_one_test_is_in_that_one():
+    pair = draw_lengths(np.random.default_rng(5), weights=True)
+    one, other = pair.parts
+    assert other.truth["B"] / one.truth["B"] == pytest.approx(other.test.length_mm / one.test.length_mm)
+    slip = pair.noise_free(Hidden("grip_slip", 1.0, {"hold": 2.0, "test": 1.0})) - pair.plain
+    assert not slip[: len(one.plain)].any() and slip[len(one.plain) :].any()
+    # a preload of each test, and what they have in common, can be absorbed
+    for name in ("k1", "preload"):
+        parts = (replace(one, truth=one.truth | {name: 1.001 * one.truth[name]}), other)
+        moved = np.append(parts[0].plain, parts[1].plain) - pair.plain
+        left = np.linalg.norm(pair.projected(moved)) / np.linalg.norm(pair.whitened(moved))
+        assert (left < 0.02) == (name == "preload")
+
+
 def test_all_effects_are_compared():
     assert {key.split("@")[0] for key, _, _ in CASES + OF_STEPS} == set(KINDS)
+    assert set(IN_NO_CATALOGUE) == set(FOREIGN)
+    assert set(OF_LENGTHS) == {"fixture_compliance", "length_dependence"}
+
+
+@pytest.mark.parametrize("kind", ["foreign", "lengths"])
+@pytest.mark.parametrize("weights", [False, True], ids=["steps", "weights"])
+def test_what_is_hidden_is_of_its_kind_and_of_the_size_asked_for(weights, kind):
+    case, drawn = draw_case_and_hidden(np.random.default_rng(7), weights, kind)
+    hidden, delta = drawn
+    assert hidden.name in {"foreign": FOREIGN, "lengths": OF_LENGTHS}[kind]
+    assert case.delta(hidden) == pytest.approx(delta, rel=0.03)
+    alike = group(case, hidden, delta)
+    assert ("unknown" in alike) == (kind == "foreign") and (hidden.name in alike) == (kind == "lengths")
+
+
+def test_what_has_no_name_is_answered_rightly_where_none_is_given():
+    row = {"group": ["unknown", "grip_slip"], "verdict": "unknown", "effects": [], "best": "unknown", "p_global": 0.01}
+    assert is_right(row) and not is_wrong(row)
+    assert is_right(row | {"verdict": "named", "effects": ["grip_slip"]})
+    assert is_wrong(row | {"verdict": "named", "effects": ["toe"]})
+    known = row | {"group": ["toe"]}
+    assert not is_right(known) and not is_wrong(known)
+
+
+def test_three_of_five_tests_hide_what_one_test_shows_and_each_kind_is_under_both_controls():
+    kinds = [kind_of(index) for index in range(20)]
+    assert [kinds.count(kind) for kind in ("catalogue", "foreign", "lengths")] == [12, 4, 4]
+    assert all(kinds[2 * i] == kinds[2 * i + 1] for i in range(10))
+    about = {"weights": True, "rests": False, "readings": "few"}
+    counted = kinds_of([about | {"kind": kind} for kind in kinds])
+    assert len(counted["two lengths"]) == 4 and len(counted["weights"]) == 20
 
 
 @pytest.mark.parametrize("seed", range(6))
