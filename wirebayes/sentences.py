@@ -34,8 +34,13 @@ def counted(count: int, what: str) -> str:
 
 def lasting(seconds: float) -> str:
     """A time as people say it: 45 s, 12 min, 24 h."""
-    unit, size = next((unit, size) for unit, size in _TIMES if seconds >= size or size == 1.0)
+    unit, size = unit_of_time(seconds)
     return f"{short(seconds / size, 3)} {unit}"
+
+
+def unit_of_time(seconds: float) -> tuple[str, float]:
+    """The unit in which people say a time, and its seconds."""
+    return next((unit, size) for unit, size in _TIMES if seconds >= size or size == 1.0)
 
 
 def to_be_held(seconds: float) -> str:

@@ -1,9 +1,12 @@
 import re
+from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from wirebayes.report.drawn import svg
-from wirebayes.report.pictures.robot import platform_edges
+from wirebayes.report.pictures.robot import in_time, platform_edges
+from wirebayes.report.pictures.robot_history import banded
 from wirebayes.report.pictures.robot_space import workspace_maps
 from wirebayes.robot.motion.claim import WorkspaceDrift
 
@@ -43,3 +46,33 @@ def test_the_labels_of_a_map_lie_inside_its_picture():
     assert len(found) == 3
     for size, right in found:  # letters turned by a quarter rise to the left of their line, by less than their size
         assert float(right) >= 0.8 * float(size)
+
+
+def _band(times_s):
+    grown = np.linspace(0.0, 1.0, len(times_s))
+    return {"mean": grown, "sd": grown, "q05": grown, "q50": grown, "q95": grown}
+
+
+@pytest.mark.parametrize(
+    ("last_s", "label", "told"),
+    [(30.0, "time, s", None), (3600.0, "time", ["0", "10 s", "1 min", "10 min", "1 h"])],
+)
+def test_times_since_a_command_are_told_in_the_units_of_the_text(last_s, label, told):
+    times = np.array([0.0, 0.01, 0.1, 1.0]) * last_s
+    entry = {"specimen_spread": 0.0, "times_s": times, "distance_mm": _band(times)}
+    (axes,) = in_time([entry, entry], "distance_mm", "mm", "Drift").axes
+    assert axes.get_xlabel() == label
+    if told is not None:
+        assert [tick.get_text() for tick in axes.get_xticklabels()] == told
+
+
+@pytest.mark.parametrize(
+    ("last_s", "label", "end"), [(45.0, "time, s", 45.0), (1800.0, "time, min", 30.0), (7200.0, "time, h", 2.0)]
+)
+def test_a_history_is_drawn_in_the_unit_of_its_length(last_s, label, end):
+    times = np.linspace(0.0, last_s, 5)
+    history = SimpleNamespace(times_s=times, payload_kg=np.array([0.0, 1.0, 1.0, 1.0, 0.0]))
+    drift = {"times_s": times, "distance_mm": _band(times)}
+    axes, load = banded(drift, "distance_mm", "mm", "Drift", history).axes
+    assert axes.get_xlabel() == label and axes.get_xlim() == (0.0, end)
+    assert axes.lines[0].get_xdata()[-1] == end and load.lines[0].get_xdata()[-1] == end

@@ -12,6 +12,7 @@ from wirebayes.json_files.summary import CreepBand, ExtrapolatedCreep
 from wirebayes.numeric.typing import Array
 from wirebayes.report.cells import with_unit
 from wirebayes.results.parameters import unit_of
+from wirebayes.sentences import lasting
 from wirebayes.wire.protocol import Control, Protocol
 
 CHAIN, HOLD, QUIET, INK = "#30506d", "#c8553d", "#b9bec4", "#1d2226"
@@ -52,6 +53,28 @@ def panel(xlabel: str, ylabel: str, title: str = "", size: tuple[float, float] =
     without_frame(axes)
     axes.tick_params(labelsize=9)
     return figure, axes
+
+
+def tell_times(axes: Any, last_s: float) -> None:
+    """Ticks of a logarithmic axis of seconds at times as people say them: 10 s, 1 min, 1 h.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    last_s : float
+        The last time that is drawn.
+    """
+    if last_s < _TOLD_S[2]:
+        axes.set_xlabel("time, s")
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        return
+    told = [time for time in _TOLD_S if time <= last_s]
+    axes.set_xlabel("time")
+    axes.set_xticks(told, [lasting(time) if time else "0" for time in told])
+    axes.xaxis.set_minor_locator(NullLocator())
+
+
+_TOLD_S = (0.0, 10.0, 60.0, 600.0, 3600.0, 36e3, 360e3, 3600e3)  # about a decade apart, whole in some unit
 
 
 def without_frame(axes: Any) -> None:

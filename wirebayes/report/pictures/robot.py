@@ -6,7 +6,6 @@ from typing import Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 from scipy.spatial import ConvexHull, QhullError
 
 from wirebayes.io.run_folder import write_json
@@ -16,7 +15,7 @@ from wirebayes.json_files.values import Band, Numbers
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Floats
 from wirebayes.report.drawn import save_figure
-from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel, verbatim
+from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel, tell_times, verbatim
 from wirebayes.report.pictures.robot_space import orientation, workspace_maps
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.pulleys import traced
@@ -244,34 +243,34 @@ def in_time(drifts: Sequence[Drift], key: Distance, label: str, title: str) -> F
     label : str
         Of the vertical axis.
     """
-    figure, axes = panel("time, s", label, title)
+    figure, axes = panel("time", label, title)
     for entry, colour in zip(drifts, (CHAIN, HOLD), strict=True):
         spread = entry["specimen_spread"]
         name = f"specimens differ by {100 * spread:g} %" if spread else "identical specimens"
         _banded(axes, entry["times_s"], entry[key], colour, name)
-    _since(axes)
+    _since(axes, drifts[0]["times_s"])
     legend_below(figure, axes)
     return figure
 
 
 def error_in_time(errors: Sequence[ControllerError]) -> Figure:
     """Pose error of the controllers against time, specimens alike; the tolerance dashed."""
-    figure, axes = panel("time, s", "pose error, mm", "Pose error by controller")
+    figure, axes = panel("time", "pose error, mm", "Pose error by controller")
     alike = [error for error in errors if error["specimen_spread"] == 0]
     for entry, colour in zip(alike, _COLOURS, strict=False):
         label = CONTROLLERS[entry["controller"]]
         _banded(axes, entry["times_s"], entry["distance_mm"], colour, label)
     axes.axhline(alike[0]["tolerance_mm"], color=INK, lw=0.9, ls="--", label="tolerance")
-    _since(axes)
+    _since(axes, alike[0]["times_s"])
     legend_below(figure, axes)
     return figure
 
 
-def _since(axes: Any) -> None:
+def _since(axes: Any, times_s: Numbers) -> None:
     axes.set_xscale("symlog", linthresh=10)
     axes.set_xlim(left=0)
     axes.set_ylim(bottom=0)
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    tell_times(axes, float(np.max(times_s)))
 
 
 def _banded(axes: Any, times_s: Numbers, band: Band, colour: str, label: str) -> None:

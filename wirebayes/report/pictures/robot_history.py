@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter
 
 from wirebayes.io.run_folder import write_bytes, write_text
 from wirebayes.json_files.pose_history import Corrections, DriftOverTime
-from wirebayes.json_files.values import INTERVAL, Band, Numbers
+from wirebayes.json_files.values import INTERVAL, Band
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.report.drawn import svg
@@ -21,7 +21,7 @@ from wirebayes.robot.history.answer import HistoryAnswer
 from wirebayes.robot.history.follow import Track
 from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.sentences import lasting
+from wirebayes.sentences import lasting, unit_of_time
 
 _COLOURS = (CHAIN, HOLD, "#5d8c4a", "#c59a2e", "#7b5ea7", "#4a9aa8", "#8a6d5c", "#b0708e", "#6b7780")
 _PANELS, _FRAMES, _SECONDS = 5, 60, 12
@@ -68,8 +68,9 @@ def banded(drift: DriftOverTime, key: Distance, label: str, title: str, history:
     history : History
         For what the platform carries.
     """
-    figure, axes = panel("time, s", label, title)
-    _band(axes, drift["times_s"], _ends_of(drift[key]), CHAIN, "median and 90 % of the draws")
+    unit, size = unit_of_time(history.times_s[-1])
+    figure, axes = panel(f"time, {unit}", label, title)
+    _band(axes, np.divide(drift["times_s"], size), _ends_of(drift[key]), CHAIN, "median and 90 % of the draws")
     axes.set_ylim(bottom=0)
     _in_time(figure, axes, history)
     return figure
@@ -77,13 +78,14 @@ def banded(drift: DriftOverTime, key: Distance, label: str, title: str, history:
 
 def corrected(corrections: Corrections, history: History) -> Figure:
     """The change of every joint value that brings the platform back, over time."""
-    figure, axes = panel("time, s", "change of the joint value, mm", "Corrections")
+    unit, size = unit_of_time(history.times_s[-1])
+    figure, axes = panel(f"time, {unit}", "change of the joint value, mm", "Corrections")
     change = corrections["change_mm"]
     if change["q50"] is not None:
         bands = np.moveaxis(_ends_of(change), -1, 0)
         for i, ends in enumerate(bands):
             colour = _COLOURS[i % len(_COLOURS)]
-            _band(axes, corrections["times_s"], ends, colour, f"joint {i + 1}", 0.14)
+            _band(axes, np.divide(corrections["times_s"], size), ends, colour, f"joint {i + 1}", 0.14)
     axes.axhline(0, color=QUIET, lw=0.8, zorder=0)
     _in_time(figure, axes, history, 4)
     return figure
@@ -94,7 +96,7 @@ def _ends_of(band: Band) -> Floats:
     return np.array([band[quantile] for quantile in INTERVAL])
 
 
-def _band(axes: Any, times: Numbers, ends: Floats, colour: str, label: str, alpha: float = 0.22) -> None:
+def _band(axes: Any, times: Floats, ends: Floats, colour: str, label: str, alpha: float = 0.22) -> None:
     """The (3, t) ends of a band and the median between them."""
     low, middle, high = ends
     axes.plot(times, middle, color=colour, label=label)
@@ -102,17 +104,19 @@ def _band(axes: Any, times: Numbers, ends: Floats, colour: str, label: str, alph
 
 
 def _in_time(figure: Figure, axes: Any, history: History, columns: int = 2) -> None:
-    axes.set_xlim(history.times_s[0], history.times_s[-1])
+    _, size = unit_of_time(history.times_s[-1])
+    times = history.times_s / size
+    axes.set_xlim(times[0], times[-1])
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     if np.ptp(history.payload_kg) > 0:
-        _draw_payload(axes, history)
+        _draw_payload(axes, times, history.payload_kg)
     legend_below(figure, axes, columns)
 
 
-def _draw_payload(axes: Any, history: History) -> None:
+def _draw_payload(axes: Any, times: Floats, payload_kg: Floats) -> None:
     load = axes.twinx()
-    load.step(history.times_s, history.payload_kg, where="post", color=INK, lw=0.8, ls="--", alpha=0.6)
-    load.set_ylim(0, 2.5 * history.payload_kg.max())
+    load.step(times, payload_kg, where="post", color=INK, lw=0.8, ls="--", alpha=0.6)
+    load.set_ylim(0, 2.5 * payload_kg.max())
     load.set_ylabel("payload, kg", fontsize=9)
     load.tick_params(labelsize=8)
     load.spines["top"].set_visible(False)

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from wirebayes.numeric.typing import Array
-from wirebayes.report.figures import CHAIN, HOLD, INK, legend_below, panel
+from wirebayes.report.figures import CHAIN, HOLD, INK, legend_below, panel, tell_times
 
 _COLOURS = (CHAIN, HOLD, "#5d8c4a", "#c59a2e", "#7b5ea7", "#4a9aa8", "#b9bec4")
 
@@ -22,7 +22,7 @@ def drifts_in_time(drifts_mm: Mapping[str, Array], times_s: Array, limit_mm: flo
     limit_mm : float
         The paper's.
     """
-    figure, axes = panel("time, s", "distance from the pose, mm", title)
+    figure, axes = panel("time", "distance from the pose, mm", title)
     colours = cycle(len(drifts_mm))
     for (name, drift), colour in zip(drifts_mm.items(), colours, strict=True):
         quantiles = np.nanquantile(drift, [0.05, 0.5, 0.95], axis=0)
@@ -33,7 +33,7 @@ def drifts_in_time(drifts_mm: Mapping[str, Array], times_s: Array, limit_mm: flo
     axes.axhline(limit_mm, color=INK, lw=0.9, ls="--", label=limit)
     axes.set_xscale("log")
     axes.set_ylim(bottom=0)
-    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    tell_times(axes, float(np.max(times_s)))
     legend_below(figure, axes, 3)
     return figure
 

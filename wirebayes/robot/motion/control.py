@@ -12,8 +12,10 @@ from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import drift, inverse, outcome
 from wirebayes.robot.motion.creep import CreepState, HoldCreep, fresh, without_creep
 from wirebayes.robot.motion.creeping_hold import CreepingHold
+from wirebayes.robot.motion.path import Slip
 
 Schedule = Callable[[float], Floats]
+_SLIP = 0.1  # of the tolerance: a jump no longer hardly uses it up
 PROBABILITY = 0.95  # with which a pose is to be within tolerance
 
 
@@ -74,6 +76,16 @@ def creep_aware(robot: Robot, model: Wires, position_m: Floats, rotation: Floats
     return joint
 
 
+def largest_slip(tolerance_m: float, tolerance_rad: float) -> Slip:
+    """The largest jump that is no fall of a platform that may be off by tolerances.
+
+    Parameters
+    ----------
+    tolerance_m, tolerance_rad : float
+    """
+    return _SLIP * tolerance_m, _SLIP * tolerance_rad
+
+
 @dataclass(frozen=True)
 class PoseError:
     """How far the platform is from its commanded pose.
@@ -112,6 +124,7 @@ def error(
     times_s: Floats,
     carried: CreepState | None = None,
     progress: ShareDone = unseen,
+    slip: Slip | None = None,
 ) -> PoseError:
     """Pose error over time of uncertain wires under one controller's commands.
 
@@ -128,8 +141,11 @@ def error(
     carried : CreepState, optional
         Creep that the wires bring along; default: they were never loaded.
     progress : function of a share between 0 and 1
+    slip : pair of floats, optional
+        As in `path.follow`.
     """
-    course = drift.hold(robot, wires, schedule, times_s, position_m, rotation, carried, progress=progress)
+    at = position_m, rotation
+    course = drift.hold(robot, wires, schedule, times_s, *at, carried, progress=progress, slip=slip)
     shift, angle = drift.distance_moved(course, position_m, rotation)
     return PoseError(course.times_s, np.linalg.norm(shift, axis=-1), angle, course.status == outcome.FOUND)
 
@@ -231,7 +247,8 @@ def lasting_within(
     progress : function of a share between 0 and 1
     """
     start = limits.position_m, limits.rotation
-    walk = CreepingHold(robot, wires, schedule, start, carried, needed=PROBABILITY)
+    slip = largest_slip(limits.distance_m, limits.angle_rad)
+    walk = CreepingHold(robot, wires, schedule, start, carried, needed=PROBABILITY, slip=slip)
     longest = 0.0
     for k, time in enumerate(times_s):
         walk.to(float(time))

@@ -39,6 +39,8 @@ class CreepingHold:
         What the zero-tension lengths before creep are beyond what the joint values say.
     needed : float
         The hold is followed while at least this share of the draws have not fallen.
+    slip : pair of floats, optional
+        As in `path.follow`.
 
     Attributes
     ----------
@@ -60,6 +62,7 @@ class CreepingHold:
         tolerance: float = TOLERANCE,
         error_m: Floats | float = 0.0,
         needed: float = 0.0,
+        slip: path.Slip | None = None,
     ) -> None:
         self.robot = robot
         self.wires = wires
@@ -67,10 +70,11 @@ class CreepingHold:
         self.tolerance = tolerance
         self.error_m = error_m
         self.needed = needed
+        self.slip = slip
         self.n = wires.count
         state = carried or fresh(robot.legs, self.n)
         self.lengths = self._lengths(0.0, state)
-        self.here = forward.solve_equilibrium(robot, wires, *self.lengths, *start)
+        self.here = path.at_rest(robot, wires, self.lengths, start)
         self.live = self.here.found
         self.creep = HoldCreep(wires, state, self.here.tension_N.T, follow)
         self.slope: Floats | None = None  # of the amount by creep's clock, and the length of the step it comes from
@@ -139,7 +143,7 @@ class CreepingHold:
         self.robot = robot
         zero, offset = self.lengths
         zero = chosen_rows(self.live, zero, np.nan)
-        self.here = forward.solve_equilibrium(robot, self.wires, zero, offset, *self.here.poses)
+        self.here = path.at_rest(robot, self.wires, (zero, offset), self.here.poses)
         fell = self.live & ~self.here.found
         self.fall_s[fell] = self.creep.time_s
         self.live = self.live & ~fell
@@ -229,11 +233,12 @@ class CreepingHold:
         new = self._lengths(time_s, creep.state())
         start = pair_at(self.here.poses, rows)
         wires = self.wires.part(rows)
-        found = path.follow(self.robot, wires, start, pair_at(self.lengths, rows), pair_at(new, rows), smallest)
+        old, onward = pair_at(self.lengths, rows), pair_at(new, rows)
+        found = path.follow(self.robot, wires, start, old, onward, smallest, self.slip)
         if len(rows) == self.n:
             return found
         here = forward.put_back(found.here, rows, self.n)
-        whole = path.Followed(here, np.ones(self.n), np.zeros(self.n))
+        whole = path.Followed(here, np.ones(self.n), np.zeros(self.n), found.slip)
         whole.share[rows] = found.share
         whole.drop_m[rows] = found.drop_m
         return whole

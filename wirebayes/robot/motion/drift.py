@@ -15,6 +15,7 @@ from wirebayes.robot.motion import inverse, one_sided, outcome
 from wirebayes.robot.motion.course import Course
 from wirebayes.robot.motion.creep import CreepState, Follow
 from wirebayes.robot.motion.creeping_hold import TOLERANCE, CreepingHold
+from wirebayes.robot.motion.path import Slip
 
 
 def hold(
@@ -28,6 +29,7 @@ def hold(
     follow: Follow = "current",
     tolerance: float = TOLERANCE,
     progress: ShareDone = unseen,
+    slip: Slip | None = None,
 ) -> Course:
     """Hold the actuators still, or let them follow a slow schedule, while the wires creep.
 
@@ -54,13 +56,15 @@ def hold(
         Error allowed in a step, of the creep so far. A tenth of the draws may err ten times as much where a wire goes
         slack, which each does but once.
     progress : function of a share between 0 and 1
+    slip : pair of floats, optional
+        As in `path.follow`.
 
     Returns
     -------
     Course
     """
     times = np.asarray(times_s, float)
-    walk = CreepingHold(robot, wires, joint_m, (start_m, start_rotation), carried, follow, tolerance)
+    walk = CreepingHold(robot, wires, joint_m, (start_m, start_rotation), carried, follow, tolerance, slip=slip)
     rows = _Rows.empty(walk.n, len(times), robot.legs)
     for k, time in enumerate(times):
         walk.to(float(time))
@@ -101,6 +105,7 @@ def from_command(
     times_s: Floats,
     follow: Follow = "current",
     progress: ShareDone = unseen,
+    slip: Slip | None = None,
 ) -> Course:
     """Drift from a pose that every draw takes exactly when the hold begins (its own inverse kinematics).
 
@@ -114,6 +119,8 @@ def from_command(
     follow : {"current", "start"}
         As for `hold`.
     progress : function of a share between 0 and 1
+    slip : pair of floats, optional
+        As in `path.follow`.
 
     Returns
     -------
@@ -123,7 +130,8 @@ def from_command(
     commands = inverse.commands_at(robot, wires, position_m, rotation)
     stable = stably(robot, wires, commands, position_m, commands.rotation)
     joint = np.where(stable[:, None], commands.joint_m, np.nan)
-    course = hold(robot, wires, joint, times_s, position_m, commands.rotation, follow=follow, progress=progress)
+    start = position_m, commands.rotation
+    course = hold(robot, wires, joint, times_s, *start, follow=follow, progress=progress, slip=slip)
     course.status[commands.feasible & ~stable] = outcome.NOT_HELD
     return course
 

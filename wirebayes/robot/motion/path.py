@@ -12,7 +12,7 @@ import numpy as np
 from wirebayes.numeric import cholesky
 from wirebayes.numeric.batches import batch_first
 from wirebayes.numeric.rows import chosen_rows, pair_at, put_rows, rows_of
-from wirebayes.numeric.typing import Bools, Floats, Indices
+from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.mechanics.description import Lengths, Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, mixed, outcome
@@ -27,6 +27,9 @@ _STRAY = 4.0  # times what is trusted: Newton's method comes back from as far, a
 _ASIDE = 1e-6  # of the platform's size: a disturbance too small to be seen, too large to be rounding
 _SMALL = 1e-7  # of the platform's size: so short a Newton step leaves only rounding
 _JUMP = 1e-7  # of the robot's span: the smallest jump that counts as one
+_SLIP = 1e-5  # of the robot's span, a hundredth of a millimetre a metre: a longer jump is a fall whoever asks
+
+Slip = tuple[float, float]  # distance, m, and angle, rad, of a jump
 
 
 @dataclass(frozen=True)
@@ -41,11 +44,14 @@ class Followed:
         Share of the change up to which each could be followed; 1 where to the end.
     drop_m : (n,) array
         How far the platform falls, to the equilibrium that catches it; infinite where none does, 0 without a fall.
+    slip : (distance_m, angle_rad)
+        The largest jump that is no fall.
     """
 
     here: forward.Equilibria
     share: Floats
     drop_m: Floats
+    slip: Slip
 
     def _go_on(self, rows: Indices, there: forward.Equilibria, held: Bools, share: Floats) -> None:
         """Take over the poses that held, in their rows, and how far along they are."""
@@ -53,16 +59,23 @@ class Followed:
             getattr(self.here, name)[rows] = getattr(there, name)[held]
         self.share[rows] = share[held]
 
-    def _fall(self, robot: Robot, wires: Wires, live: Indices, fell: Bools, lengths: Lengths, start: Poses) -> None:
-        """Note where those of the `live` platforms that fell come to rest downhill from their poses."""
-        rows = live[fell]
-        begin = pair_at(start, fell)
-        own_wires = wires.part(np.flatnonzero(fell))
-        caught = forward.solve_equilibrium(robot, own_wires, *pair_at(lengths, fell), *begin)
+    def _catch(
+        self, robot: Robot, wires: Wires, rows: Indices, share: Floats, lengths: Lengths, begin: Poses, may_slip: Bools
+    ) -> Bools:
+        """Note where platforms that jumped come to rest; (n,) says which of them fell.
+
+        The others slip to an equilibrium so near that they go on from there, at their `share` of the change.
+        """
+        caught = at_rest(robot, wires, lengths, begin)
+        slips = caught.found & may_slip & _within(self.slip, caught.poses, begin)
+        self._go_on(rows[slips], caught, slips, share)
         distance = np.linalg.norm(caught.position_m - begin[0], axis=1)
         lost = caught.status == outcome.NOT_CONVERGED
-        self.here.status[rows] = np.where(lost, outcome.NOT_CONVERGED, outcome.FELL)
-        self.drop_m[rows] = np.where(caught.found, distance, np.inf)
+        ended = np.where(lost, outcome.NOT_CONVERGED, outcome.FELL)
+        dropped = np.where(caught.found, distance, np.inf)
+        self.here.status[rows[~slips]] = ended[~slips]
+        self.drop_m[rows[~slips]] = dropped[~slips]
+        return ~slips
 
 
 def follow(
@@ -72,6 +85,7 @@ def follow(
     old: Lengths,
     new: Lengths,
     smallest: float = SMALLEST,
+    slip: Slip | None = None,
 ) -> Followed:
     """Follow equilibria from old lengths to new ones, in a straight line.
 
@@ -86,15 +100,18 @@ def follow(
         Zero-tension lengths and offsets, as in `forward.solve_equilibrium`.
     smallest : float
         Share of the change down to which it is divided; what jumps there still counts as a fall.
+    slip : pair of floats, optional
+        The largest jump that is no fall, m and rad: the platform is followed from where it is caught. It is at most a
+        share of the robot's span, the default.
 
     Returns
     -------
     Followed
     """
-    followed, good = _undivided(robot, wires, start, old, new)
+    followed, good = _undivided(robot, wires, start, old, new, slip_of(robot, slip))
     here = followed.here
     n = len(good)
-    divided = _Divided(np.full(n, 0.5), np.zeros(n, bool))
+    divided = _Divided(np.full(n, 0.5), np.zeros(n, bool), np.full(n, robot.legs))
     balanced = np.isfinite(here.position_m).all(1)
     live = np.flatnonzero(~good & balanced)
     while live.size:
@@ -107,8 +124,12 @@ def follow(
         followed._go_on(live[held], there, held, share)
         divided.adapt(live, held)
         fell = ~held & (divided.step[live] < smallest)
-        if fell.any():
-            followed._fall(robot, part, live, fell, between, pose)
+        jumped = np.flatnonzero(fell)
+        if jumped.size:
+            rows = live[jumped]
+            at = share[jumped], pair_at(between, jumped), pair_at(pose, jumped)
+            fell[jumped] = followed._catch(robot, part.part(jumped), rows, *at, divided.slips[rows] > 0)
+            divided.go_on(rows[~fell[jumped]])
         going_on = ~fell & (followed.share[live] < 1.0)
         live = live[going_on]
     return followed
@@ -121,7 +142,22 @@ def _between(old: Lengths, new: Lengths, rows: Indices, share: Floats) -> Length
     return zero, offset
 
 
-def _undivided(robot: Robot, wires: Wires, start: Poses, old: Lengths, new: Lengths) -> tuple[Followed, Bools]:
+def slip_of(robot: Robot, slip: Slip | None) -> Slip:
+    """The largest jump that is no fall: a share of the robot's span, or what is given if it is less.
+
+    Parameters
+    ----------
+    robot : Robot
+    slip : (distance_m, angle_rad) or None
+    """
+    most_m = _SLIP * robot.span_m
+    distance_m, angle_rad = slip or (np.inf, np.inf)
+    return min(distance_m, most_m), min(angle_rad, most_m / robot.size_m)
+
+
+def _undivided(
+    robot: Robot, wires: Wires, start: Poses, old: Lengths, new: Lengths, slip: Slip
+) -> tuple[Followed, Bools]:
     """All at once, as most need no division; the others are where they were, and (n,) says which are not."""
     x, R = np.array(start[0]), np.array(start[1])
     tau = tensions_at(robot, wires, x, R, *old)
@@ -129,7 +165,7 @@ def _undivided(robot: Robot, wires: Wires, start: Poses, old: Lengths, new: Leng
     whole.position_m[~good] = x[~good]
     whole.rotation[~good] = R[~good]
     whole.tension_N[~good] = tau[~good]
-    return Followed(whole, np.where(good, 1.0, 0.0), np.zeros(len(x))), good
+    return Followed(whole, np.where(good, 1.0, 0.0), np.zeros(len(x)), slip), good
 
 
 @dataclass(frozen=True)
@@ -142,10 +178,18 @@ class _Divided:
         Share of the change that is tried next.
     hesitant : (n,) bool array
         Whether the last step was not held.
+    slips : (n,) int array
+        How many more jumps may be slips: every wire lets go or takes over once, and what jumps on and on is a fall.
     """
 
     step: Floats
     hesitant: Bools
+    slips: Ints
+
+    def go_on(self, rows: Indices) -> None:
+        """Long steps again after slips: what was hard lies behind."""
+        self.step[rows] = 0.5
+        self.slips[rows] -= 1
 
     def adapt(self, live: Indices, held: Bools) -> None:
         """Longer steps where one held, half as long where it did not.
@@ -200,6 +244,14 @@ def _apart_m(robot: Robot, there: Poses, predicted: Poses) -> Floats:
     return np.maximum(displaced, robot.size_m * turned)
 
 
+def _within(slip: Slip, there: Poses, here: Poses) -> Bools:
+    """(n,) Which poses lie no farther from others than a slip."""
+    displaced = np.linalg.norm(there[0] - here[0], axis=1)
+    turn = there[1] @ here[1].mT - np.eye(3)
+    angle = np.linalg.norm(turn, axis=(1, 2)) / np.sqrt(2.0)
+    return np.asarray((displaced <= slip[0]) & (angle <= slip[1]))
+
+
 def _let_go(robot: Robot, wires: Wires, there: forward.Equilibria, lengths: Lengths) -> None:
     """Put in place of unstable balances the equilibria next to them, to which the least disturbance leads.
 
@@ -216,6 +268,24 @@ def _let_go(robot: Robot, wires: Wires, there: forward.Equilibria, lengths: Leng
     aside = mixed.after_step(robot, balance, _ASIDE * robot.size_m * softest)
     found = forward.solve_equilibrium(robot, own_wires, *own_lengths, *aside)
     put_rows(there, loose[found.found], rows_of(found, found.found))
+
+
+def at_rest(robot: Robot, wires: Wires, lengths: Lengths, start: Poses) -> forward.Equilibria:
+    """Where platforms come to rest from poses: no unstable balance, but the equilibrium next to it.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+        ``n`` draws.
+    lengths : pair of (n, w) arrays
+        As in `forward.solve_equilibrium`.
+    start : (position, rotation)
+        (n, 3) or (3,), m, and (n, 3, 3) or (3, 3).
+    """
+    there = forward.solve_equilibrium(robot, wires, *lengths, *start)
+    _let_go(robot, wires, there, lengths)
+    return there
 
 
 def _softest(robot: Robot, wires: Wires, balance: Poses, lengths: Lengths) -> Floats:

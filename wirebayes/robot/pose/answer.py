@@ -184,11 +184,12 @@ def _courses(held: _Held, rng: Generator, progress: ShareDone) -> dict[float, Co
     """The drift from the pose, by the spread between specimens."""
     robot, request = held.robot, held.request
     at = request.position_m, request.rotation, request.times_s
+    slip = control.largest_slip(request.tolerance_m, request.tolerance_rad)
     courses = {}
     done = shares_of(progress, len(request.spreads))
     for spread in request.spreads:
         wires = draws.for_robot(robot, held.line, spread, rng)
-        courses[spread] = drift.from_command(robot, wires, *at, progress=next(done))
+        courses[spread] = drift.from_command(robot, wires, *at, progress=next(done), slip=slip)
     return courses
 
 

@@ -51,11 +51,12 @@ def errors(
         schedules["creep_aware_other_fit"] = control.creep_aware(robot, less, request.position_m, request.rotation)
     out: list[ControllerError] = []
     at = request.position_m, request.rotation, request.times_s
+    slip = control.largest_slip(request.tolerance_m, request.tolerance_rad)
     done = shares_of(progress, len(request.spreads) * len(schedules))
     for spread in request.spreads:
         wires = draws.for_robot(robot, line, spread, rng)
         for name, schedule in schedules.items():
-            error = control.error(robot, wires, schedule, *at, progress=next(done))
+            error = control.error(robot, wires, schedule, *at, progress=next(done), slip=slip)
             out.append(
                 {
                     "specimen_spread": spread,
