@@ -74,7 +74,7 @@ def test_all_pairs_of_different_effects_count_and_forms_share_the_weight_of_thei
     sizes = np.log(np.bincount(x.kinds)) - np.log(2.0) * np.array([x.one_sided[x.kinds == k][0] for k in range(3)])
     half = 0.5 * x.degrees
     upward = np.where(x.one_sided, np.maximum(found.along[0], 0.0), found.along[0])
-    alone = logsumexp(found.shared[0][:, None] - half * np.log(found.rss[0][:, None] - upward**2 / found.square[0]), 0)
+    alone = logsumexp(found.shared[0][:, None] - half * np.log(found.rss[0][:, None] - upward**2 / found.divisor[0]), 0)
     terms = []
     for kind in range(3):
         best = max(np.flatnonzero(x.kinds == kind), key=lambda m: alone[m])

@@ -144,8 +144,8 @@ def _scan_few(x: Expansion) -> Scan:
         found.shared.T,
         found.rss.T,
         np.swapaxes(found.along, 0, 1),
-        np.swapaxes(found.whole, 0, 1),
-        np.swapaxes(np.isfinite(found.square), 0, 1),
+        np.swapaxes(found.square, 0, 1),
+        np.swapaxes(np.isfinite(found.divisor), 0, 1),
         x.degrees,
         x.least,
         x.one_sided,
@@ -170,11 +170,11 @@ def _most_probable(effects: Array, found: Projected, left: Array, degrees: int) 
     def at_best(values: Array) -> Array:
         return np.take_along_axis(values, best, axis=1)[:, 0]
 
-    square = at_best(found.square)
+    square = at_best(found.divisor)
     # there may be fewer readings than parameters, of which nothing is known
     known = np.where(np.isfinite(square), square, 0.0)
     norm = np.sqrt(np.maximum(known * degrees / at_best(left), 0.0))
-    return at_best(found.along / found.square), norm
+    return at_best(found.along / found.divisor), norm
 
 
 _PIECE = 16  # parameter sets scanned at once: what stays in the cache

@@ -58,9 +58,10 @@ class Projected:
     rss : (n, k)
         Of the residual with itself, the prior's square included.
     along, square : (n, k, m)
-        Of each signature with the residual and with itself; infinite where the parameters take all of a signature.
-    whole : (n, k, m)
-        Of each signature with itself, however much of it the parameters take.
+        Of each signature with the residual and with itself.
+    divisor : (n, k, m)
+        What `along` is divided by for a signature's best amplitude: its square, or infinity where the parameters take
+        all of it but rounding errors, so that the amplitude is zero.
     smooth_along, smooth_square : (n, k, q) and (n, k, q, q) for each process
         Of its smooth functions with the residual and with each other.
     form : Functions
@@ -75,7 +76,7 @@ class Projected:
     rss: Array
     along: Array
     square: Array
-    whole: Array
+    divisor: Array
     smooth_along: list[Array]
     smooth_square: list[Array]
     form: "Functions"
@@ -100,8 +101,8 @@ def project(x: Expansion) -> Projected:
         shared=-0.5 * moved_whole.sum(axis=2) - log_volume,
         rss=residual.squares(shrink)[..., 0] + x.prior_square[:, None],
         along=form.along(residual, shrink),
-        square=np.where(is_left, square, np.inf),
-        whole=np.maximum(square, 0.0),
+        square=np.maximum(square, 0.0),
+        divisor=np.where(is_left, square, np.inf),
         smooth_along=[process.along(residual, shrink) for process in smooth],
         smooth_square=[process.products(process, shrink) for process in smooth],
         form=form,
@@ -155,7 +156,7 @@ def _with_parameters(x: Expansion, columns: Array, levels: Array, shrink: Array)
 def with_each_signature(x: Expansion, found: Projected) -> tuple[Array, Array]:
     """(n, k, m) sum of squares that each signature at its best amplitude leaves, and log evidence, at each ratio."""
     upward = np.where(x.one_sided, np.maximum(found.along, 0.0), found.along)
-    left = np.maximum(found.rss[..., None] - upward**2 / found.square, x.least[:, None, None])
+    left = np.maximum(found.rss[..., None] - upward**2 / found.divisor, x.least[:, None, None])
     return left, found.shared[..., None] - 0.5 * x.degrees * np.log(left)
 
 

@@ -77,7 +77,7 @@ def _with_remainder(found: Projected, seen: Bools) -> _Products:
     shared = found.shared[0][seen][:, None]
     rss = found.rss[0][seen][:, None]
     along = found.along[0][seen][:, None]
-    square = found.square[0][seen][:, None]
+    square = found.divisor[0][seen][:, None]
     return _Products(
         shared - 0.5 * volume,
         rss - (taken * of_residual**2).sum(axis=2),

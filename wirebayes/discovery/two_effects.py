@@ -112,7 +112,7 @@ def _leading(single: Array, groups: list[Ints]) -> Ints:
 
 def _explained(x: Expansion, found: Projected, first: Ints) -> Array:
     """(n, k, j, m) of the sum of squares by some signatures with each one; -inf where an amplitude has no meaning."""
-    each = _Signatures(found.along[:, :, None, :], found.square[:, :, None, :])
+    each = _Signatures(found.along[:, :, None, :], found.divisor[:, :, None, :])
     leading = _Signatures.chosen(found, first)
     cross = found.form.of(first).products(found.form, found.shrink)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
@@ -138,7 +138,7 @@ class _Signatures(NamedTuple):
         """Signatures with the numbers (n, j), as (n, k, j, 1)."""
         at = numbers[:, None]
         along = np.take_along_axis(found.along, at, axis=2)
-        square = np.take_along_axis(found.square, at, axis=2)
+        square = np.take_along_axis(found.divisor, at, axis=2)
         return cls(along[..., None], square[..., None])
 
     def determinant(self, other: "_Signatures", cross: Array) -> Array:

@@ -21,7 +21,7 @@ class CalibrationPrior(TypedDict):
 
 
 class Interval(MeanAndSd):
-    """With the 90 % interval."""
+    """Mean, standard deviation and 90 % interval, a number for each wire."""
 
     q05: Numbers
     q95: Numbers
@@ -87,7 +87,10 @@ class Observed(TypedDict):
 
 
 class CalibratedPoses(TypedDict):
-    """None where the search did not converge; no joint values either where nothing holds the home pose."""
+    """The pose now, and joint values for the home pose.
+
+    Both are None where the search did not converge; joint values also where nothing holds the home pose.
+    """
 
     pose_now: PoseNow | None
     joint_values_for_home_m: Numbers | None
@@ -131,7 +134,7 @@ class UnknownsJson(BelongsTo, CalibratedUnknowns):
 
 
 class NamedEstimates(TypedDict):
-    """Geometry (a row a leg), lengths and poses."""
+    """Estimates of geometry (a row a leg), lengths and poses."""
 
     exit_points_m: Interval
     platform_points_m: Interval

@@ -18,7 +18,7 @@ class LeaveOneHoldOut(TypedDict):
 
 
 class ReadingsJson(TypedDict):
-    """Of held-out holds, a row a reading; for pictures."""
+    """Measured and predicted readings of held-out holds, a row a reading; for pictures."""
 
     hold: Integers
     time_s: Numbers
@@ -83,14 +83,17 @@ class ModelJson(Warned):
 
 
 class Difference(TypedDict):
-    """From the model that all are compared with, and its standard error."""
+    """A difference of elpd from the model that all are compared with, and its standard error."""
 
     elpd: float
     se: float
 
 
 class Differences(TypedDict):
-    """By leaving out each hold, by the last holds, and by these given their first readings; None where unlike."""
+    """Differences by leaving out each hold, by the last holds, and by these given their first readings.
+
+    None where models were not scored on the same readings.
+    """
 
     difference: Difference | None
     held_out_difference: Difference | None

@@ -62,7 +62,7 @@ class ParameterReport(TypedDict):
 
 
 class Disagreement(TypedDict):
-    """Along what model and readings disagree; `hold` where it is one hold."""
+    """Along what covariate model and readings disagree; `hold` where it is one hold."""
 
     covariate: str
     hold: int | None
@@ -136,7 +136,7 @@ class StepJson(ScoresJson):
 
 
 class FinalScores(ScoresJson):
-    """With the standard error of the elpd's difference from the plain model; None for a single hold."""
+    """Scores with the standard error of the elpd's difference from the plain model; None for a single hold."""
 
     elpd_difference_se: float | None
 

@@ -8,12 +8,12 @@ from wirebayes.result_warnings import Warned
 
 
 class ExpectedWidth(TypedDict):
-    """Of a quantity's posterior, over the simulated tests.
+    """How wide a quantity's posterior is expected to be, over the simulated tests.
 
-    Medians: `sd` of its standard deviation, `width_90` of the length of its 90 % interval; in 90 % of the tests that
-    length lies between `width_90_low` and `width_90_high`. Means would depend on the one test in thirty whose posterior
-    has a second mode or a long tail. `guess_sd` is the standard deviation before the test;
-    all are in `unit`.
+    `sd` is the median of its standard deviation, `width_90` that of the length of its 90 % interval; in 90 % of the
+    tests that length lies between `width_90_low` and `width_90_high`. Means would depend on the one test in thirty
+    whose posterior has a second mode or a long tail. `guess_sd` is the standard deviation before the test; all are in
+    `unit`.
     """
 
     sd: float

@@ -8,7 +8,7 @@ from wirebayes.result_warnings import Warned
 
 
 class Specimens(TypedDict):
-    """Of a line of which several specimens were tested."""
+    """How many specimens of a line were tested, and how far they differ."""
 
     tests: int
     spread: dict[str, Quantiles]
@@ -37,7 +37,7 @@ class TensionDistribution(TypedDict):
 
 
 class MotorAngles(TypedDict):
-    """None for legs without a drum of known radius."""
+    """Angles of the motors; None for legs without a drum of known radius."""
 
     motor_angle_rad: Band
     wire_per_motor_angle_m_rad: Band
@@ -100,7 +100,7 @@ class OnPlane(TypedDict):
 
 
 class EquilibriaJson(TypedDict):
-    """All that were found from many starts."""
+    """All equilibria that were found from many starts."""
 
     stable_found: int
     starts: int
@@ -118,7 +118,7 @@ class ProvedBand(TypedDict):
 
 
 class EnclosedBand(TypedDict, total=False):
-    """Empty where no proof can be tried."""
+    """The band that was proved; not there where no proof can be tried."""
 
     band: ProvedBand
 
@@ -133,7 +133,7 @@ class CertificateJson(EnclosedBand):
 
 
 class DriftBands(TypedDict):
-    """From the commanded pose, a value a time."""
+    """Drift from the commanded pose, a value a time."""
 
     times_s: Numbers
     solved: float
@@ -152,7 +152,7 @@ class Drift(DriftBands):
 
 
 class Times(TypedDict):
-    """Of what some draws go through."""
+    """When the first, the median and the last of the draws reach something that only some of them reach."""
 
     first: float
     median: float
@@ -177,7 +177,7 @@ class FallsReport(TypedDict):
 
 
 class Stability(FallsReport):
-    """For one spread of specimens."""
+    """Falls and margins for one spread of specimens."""
 
     specimen_spread: float
 
@@ -199,7 +199,7 @@ class Claim(TypedDict):
 
 
 class Tolerances(TypedDict):
-    """Of the pose."""
+    """Tolerances of the pose."""
 
     tolerance_mm: float
     tolerance_deg: float

@@ -61,7 +61,7 @@ class ClockJson(TypedDict):
 
 
 class DriftOverTime(Drift):
-    """From where the platform is meant to be; `held` is the share of the draws that hold it at each time."""
+    """Drift from where the platform is meant to be; `held` is the share of the draws that hold it at each time."""
 
     held: Numbers
 

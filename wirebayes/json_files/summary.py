@@ -12,7 +12,7 @@ CREEP_TIMES_S = {"creep_2min_mm": 120.0, "creep_1h_mm": 3600.0, "creep_1day_mm":
 
 
 class Mixed(Statistics):
-    """Of draws of several chains, and how well these have mixed."""
+    """Statistics of the draws of several chains, and how well these have mixed."""
 
     ess_bulk: float
     ess_tail: float
@@ -26,7 +26,7 @@ class Parameter(Mixed):
 
 
 class Derived(TypedDict):
-    """Of a fresh sample of `length_mm` under a constant `tension_N` that was tested.
+    """Derived quantities of a fresh sample of `length_mm` under a constant `tension_N` that was tested.
 
     None where a draw has no finite value, as of endless creep.
     """

@@ -17,7 +17,7 @@ INTERVAL: tuple[Quantile, ...] = ("q05", "q50", "q95")  # the ends of a 90 % int
 
 
 class Quantiles(TypedDict):
-    """Of draws."""
+    """Three quantiles of draws."""
 
     q05: float
     q50: float
@@ -25,7 +25,7 @@ class Quantiles(TypedDict):
 
 
 class Statistics(Quantiles):
-    """Of draws."""
+    """Mean, standard deviation and quantiles of draws."""
 
     mean: float
     sd: float
@@ -42,7 +42,7 @@ class Band(TypedDict):
 
 
 class MeanAndSd(TypedDict):
-    """Of each wire."""
+    """Mean and standard deviation of a quantity, a number for each wire."""
 
     mean: Numbers
     sd: Numbers
