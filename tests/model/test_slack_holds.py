@@ -146,12 +146,14 @@ def test_compiled_sides_are_those_of_numpy(keys, monkeypatch):
     line = streamed(p, theta, model, seen.first_readings)
     value, residuals = likelihoods.standardised(line, seen)
     filtered = likelihoods.chain(line, seen)
+    of_stored = likelihoods.chain(linearise(p, theta, model, seen.first_readings), seen)
     monkeypatch.setattr(compiled, "kernel", None)
     expected = linearise(p, theta, model, seen.first_readings)
     assert 0.3 < expected.edges.near.mean() < 0.95
     by_numpy = likelihoods.chain(expected, seen)
     for name, wanted in vars(by_numpy).items():
-        np.testing.assert_allclose(getattr(filtered, name), wanted, rtol=1e-7, atol=1e-9)
+        for compiled_one in (filtered, of_stored):
+            np.testing.assert_allclose(getattr(compiled_one, name), wanted, rtol=1e-7, atol=1e-9)
     wanted_value, wanted_residuals = likelihoods.standardised(expected, seen)
     np.testing.assert_allclose(value, wanted_value, rtol=1e-7)
     np.testing.assert_allclose(residuals, wanted_residuals, rtol=1e-6, atol=1e-7)

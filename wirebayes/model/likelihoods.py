@@ -18,9 +18,10 @@ from wirebayes.model.hold_filter import (
     carried_unread,
     information_of,
 )
-from wirebayes.model.slack_holds import filter_holds, read_hold, settled
-from wirebayes.numeric.typing import Array
+from wirebayes.model.slack_holds import EitherSide, filter_holds, read_hold, settled
+from wirebayes.numeric.typing import Array, Bools
 from wirebayes.wire import compiled
+from wirebayes.wire.edges import as_found
 from wirebayes.wire.staircase import Linearised
 
 if TYPE_CHECKING:
@@ -39,11 +40,14 @@ class Filtered:
         log p(readings of the hold | readings of the holds before); zero for an unrecorded hold.
     carried_mean, carried_var : (H + 1, n)
         Deviation of the creep carried into each hold from its nominal value, given the holds before, mm and mm².
+    is_taut : (H, n) bool array
+        Near an edge, whether a taut wire is more probable than a slack one.
     """
 
     log_likelihood: Array
     carried_mean: Array
     carried_var: Array
+    is_taut: Bools
 
 
 def reading_variance(sensor_sd: Array, resolution: float) -> Array:
@@ -60,19 +64,24 @@ def chain(line: "Linearised | Staircases", measured: Measured) -> Filtered:
         What `wirebayes.wire.staircase.linearise` or `streamed` returned.
     measured : Measured
     """
-    if _is_compiled(line):
-        return Filtered(*compiled.kernel.chain(*_compiled(line, measured)))
+    if compiled.kernel is not None:
+        of, *observed = _compiled(line, measured)
+        seen_taut = np.zeros((len(measured.mask), of.n), np.uint8)
+        return Filtered(*compiled.kernel.chain(of, *observed, is_taut=seen_taut), seen_taut.view(bool))
     assert isinstance(line, Linearised)  # nothing is streamed without the kernel
     holds, _, n = line.reading.shape
     log_likelihood = np.zeros((holds, n))
     mean = np.zeros((holds + 1, n))
     var = np.zeros((holds + 1, n))
+    is_taut = np.zeros((holds, n), bool)
     for j, (carried_mean, carried_var, read) in enumerate(filter_holds(line, measured)):
         mean[j + 1] = carried_mean
         var[j + 1] = carried_var
         if read is not None:
             log_likelihood[j] = read.log_density
-    return Filtered(log_likelihood, mean, var)
+        if isinstance(read, EitherSide):
+            is_taut[j] = read.near & (read.log_taut > read.log_slack)
+    return Filtered(log_likelihood, mean, var, is_taut)
 
 
 def standardised(line: "Linearised | Staircases", measured: Measured) -> tuple[Array, Array]:
@@ -91,7 +100,7 @@ def standardised(line: "Linearised | Staircases", measured: Measured) -> tuple[A
     -------
     (n,) and (m, n) arrays
     """
-    if _is_compiled(line):
+    if compiled.kernel is not None:
         return compiled.kernel.standardised(*_compiled(line, measured))
     assert isinstance(line, Linearised)  # nothing is streamed without the kernel
     log_likelihood = np.zeros(line.reading.shape[2])
@@ -103,15 +112,16 @@ def standardised(line: "Linearised | Staircases", measured: Measured) -> tuple[A
     return log_likelihood, np.concatenate(residuals)
 
 
-def _is_compiled(line: "Linearised | Staircases") -> bool:
-    """Whether compiled filters take a staircase: of those that were stored only what is on one side of every edge."""
-    return compiled.kernel is not None and not (isinstance(line, Linearised) and line.edges is not None)
-
-
 def _compiled(line: "Linearised | Staircases", measured: Measured) -> tuple[Any, ...]:
     """What the compiled filters are called with."""
-    of = compiled.kernel.Stored(*_flat(line)) if isinstance(line, Linearised) else line
+    of = _stored(line) if isinstance(line, Linearised) else line
     return of, *_observed(of.n, measured)
+
+
+def _stored(line: Linearised) -> "Staircases":
+    """Staircases that were computed before."""
+    edges = None if line.edges is None else as_found(line.edges)
+    return compiled.kernel.Stored(*_flat(line), edges=edges)
 
 
 def _flat(line: Linearised) -> tuple[Array, ...]:
@@ -185,7 +195,7 @@ def on_sides(line: Linearised, measured: Measured) -> OnSides:
     every = chain(line, measured)
     if line.edges is None:
         return OnSides(line, every, np.zeros_like(every.log_likelihood))
-    chosen = settled(line, measured)
+    chosen = settled(line, every.is_taut, measured)
     filtered = chain(chosen, measured)
     return OnSides(chosen, filtered, every.log_likelihood - filtered.log_likelihood)
 

@@ -148,35 +148,22 @@ def filter_holds(line: Linearised, measured: Measured) -> Iterator[tuple[Array, 
         yield mean, var, read
 
 
-def settled(line: Linearised, measured: Measured) -> Linearised:
-    """A staircase that has each hold on the side of its edge where the readings are more probable.
+def settled(line: Linearised, is_taut: Bools, measured: Measured) -> Linearised:
+    """A staircase that has each hold that was read on the side of its edge where the readings are more probable.
+
+    What the holds near an edge carry on moves those after them.
 
     Parameters
     ----------
     line : Linearised
         With edges.
+    is_taut : (H, n) bool array
+        Near an edge, whether that is the side of a taut wire.
     measured : Measured
     """
     assert line.edges is not None
-    recorded = np.asarray(measured.mask.any(axis=1))
-    near = line.edges.near & recorded[:, None]
-    is_taut = np.zeros(near.shape, bool)
-    for j, (_, _, read) in enumerate(filter_holds(line, measured)):
-        if isinstance(read, EitherSide):
-            is_taut[j] = read.log_taut > read.log_slack
-    return _moved_to_sides(line, near, is_taut)
-
-
-def _moved_to_sides(line: Linearised, near: Bools, is_taut: Bools) -> Linearised:
-    """A staircase whose holds near an edge are on one side of it; what they carry on moves those after them.
-
-    Parameters
-    ----------
-    line : Linearised
-    near, is_taut : (H, n) bool arrays
-    """
-    assert line.edges is not None
     taut, slack = line.edges.taut, line.edges.slack
+    near = line.edges.near & ~np.isnan(measured.first_readings.value)
 
     def chosen(usual: Array, if_taut: Array, if_slack: Array) -> Array:
         shape = (len(near),) + (1,) * (usual.ndim - 2) + near.shape[1:]

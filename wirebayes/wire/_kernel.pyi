@@ -40,6 +40,8 @@ class Stored(Staircases):
         by_creep: Array,
         carry_by_setting: Array,
         carry_by_creep: Array,
+        *,
+        edges: tuple[Array, ...] | None = ...,
     ) -> None: ...
 
 def linearise(
@@ -48,7 +50,13 @@ def linearise(
 def simulate(test: Test, law: Law, theta: Array, setting_error: Array, each_alone: bool = ...) -> Array: ...
 def courses(test: Test, law: Law, theta: Array, first_N: Array, most_steps: int) -> tuple[Array, Array]: ...
 def chain(
-    of: Staircases, readings: Array, mask: Array, variance: Array, setting_sd: Array
+    of: Staircases,
+    readings: Array,
+    mask: Array,
+    variance: Array,
+    setting_sd: Array,
+    *,
+    is_taut: NDArray[np.uint8] | None = ...,
 ) -> tuple[Array, Array, Array]: ...
 def squares_gained(
     drive: Array,

@@ -863,17 +863,26 @@ cdef class Computed(Staircases):
 
 
 cdef class Stored(Staircases):
-    """Staircases that were computed before (see `wirebayes.wire.staircase.Linearised`)."""
+    """Staircases that were computed before (see `wirebayes.wire.staircase.Linearised`), and their edges, if any.
+
+    Edges are what `linearise` returns of them.
+    """
 
     cdef const double[:, :, ::1] tension, by_setting, by_creep
     cdef const double[:, ::1] carry_by_setting, carry_by_creep
+    cdef const unsigned char[:, ::1] is_near
+    cdef const double[:, :, :, ::1] if_taut, if_slack
+    cdef const double[:, :, ::1] stretches, taut_carries, slack_carries
 
     def __init__(self, const double[:, :, ::1] tension, const double[:, :, ::1] by_setting,
                  const double[:, :, ::1] by_creep, const double[:, ::1] carry_by_setting,
-                 const double[:, ::1] carry_by_creep):
+                 const double[:, ::1] carry_by_creep, edges=None):
         self.allocate(tension.shape[2], tension.shape[0], tension.shape[1])
         self.tension, self.by_setting, self.by_creep = tension, by_setting, by_creep
         self.carry_by_setting, self.carry_by_creep = carry_by_setting, carry_by_creep
+        self.is_near = np.zeros((0, 0), np.uint8)
+        if edges is not None:
+            self.is_near, self.stretches, self.if_taut, self.taut_carries, self.if_slack, self.slack_carries = edges
 
     cdef void ask(self, Py_ssize_t i) noexcept:
         cdef int j, r
@@ -883,6 +892,21 @@ cdef class Stored(Staircases):
                     self.tension[j, r, i], self.by_setting[j, r, i], self.by_creep[j, r, i]
                 )
             self.carry[j] = Dual(0.0, self.carry_by_setting[j, i], self.carry_by_creep[j, i])
+            self.near[j] = self.is_near.shape[0] and self.is_near[j, i]
+            if self.near[j]:
+                self.stretch[j] = read_one(self.stretches, j, i)
+                self.taut_carry[j], self.slack_carry[j] = read_one(self.taut_carries, j, i), read_one(self.slack_carries, j, i)
+                for r in range(self.width):
+                    self.taut[j * self.width + r] = Dual(
+                        self.if_taut[0, j, r, i], self.if_taut[1, j, r, i], self.if_taut[2, j, r, i]
+                    )
+                    self.slack[j * self.width + r] = Dual(
+                        self.if_slack[0, j, r, i], self.if_slack[1, j, r, i], self.if_slack[2, j, r, i]
+                    )
+
+
+cdef inline Dual read_one(const double[:, :, ::1] values, int j, Py_ssize_t i) noexcept:
+    return Dual(values[0, j, i], values[1, j, i], values[2, j, i])
 
 
 def linearise(
@@ -1019,6 +1043,7 @@ cdef void alone(
 cdef struct Read:
     # What the readings of one hold say: see `wirebayes.model.hold_filter.HoldRead`.
     double log_density, mean, var, pull_c, pull_s, cc, ss, v_cc, v_cs, v_ss
+    bint is_taut  # of a hold near an edge, whether a taut wire is the more probable
 
 
 cdef struct Noise:
@@ -1065,7 +1090,7 @@ cdef inline Read read_line(
     out.log_density = -0.5 * (square + count * noise.log_variance + log(det))
     out.mean = carry.c * (m + post_c) + carry.s * post_s
     out.var = carry.c * carry.c * v_cc + 2.0 * carry.c * carry.s * v_cs + carry.s * carry.s * v_ss
-    out.cc, out.ss, out.v_cc, out.v_cs, out.v_ss = cc, ss, v_cc, v_cs, v_ss
+    out.cc, out.ss, out.v_cc, out.v_cs, out.v_ss, out.is_taut = cc, ss, v_cc, v_cs, v_ss, False
     return out
 
 
@@ -1105,7 +1130,8 @@ cdef Read read_sides(
     density = log_sum(log_taut, log_slack)
     share = exp(log_taut - density)
     out = taut
-    if not log_taut > log_slack:
+    out.is_taut = log_taut > log_slack
+    if not out.is_taut:
         out = slack
         for r in range(of.width):
             left[r] = other[r]
@@ -1167,9 +1193,12 @@ cdef inline bint is_unseen(
 
 def chain(
     Staircases of, const double[:, :, :] readings, const unsigned char[:, ::1] mask, const double[::1] variance,
-    const double[::1] setting_sd
+    const double[::1] setting_sd, unsigned char[:, ::1] is_taut=None
 ):
-    """Log densities (H, n), means and variances of the carried creep (H + 1, n): `wirebayes.model.likelihoods.chain`."""
+    """Log densities (H, n), means and variances of the carried creep (H + 1, n): `wirebayes.model.likelihoods.chain`.
+
+    Written into `is_taut` (H, n) is, near an edge, whether a taut wire is more probable than a slack one.
+    """
     cdef int holds = mask.shape[0], j
     cdef Py_ssize_t n = variance.shape[0], i
     density, carried = np.zeros((holds, n)), np.zeros((2, holds + 1, n))
@@ -1190,6 +1219,8 @@ def chain(
                     of, readings, mask, j, i, mv[0, j, i], mv[1, j, i], noise, &left[0, 0], &left[1, 0]
                 )
                 out[j, i], mv[0, j + 1, i], mv[1, j + 1, i] = found.log_density, found.mean, found.var
+                if is_taut is not None:
+                    is_taut[j, i] = found.is_taut
             else:
                 a, c = of.carry[j].c, of.carry[j].s
                 mv[0, j + 1, i] = a * mv[0, j, i]

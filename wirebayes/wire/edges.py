@@ -202,3 +202,16 @@ def edges_of(near: Array, stretch: Array, taut: Array, taut_carry: Array, slack:
     value, by_setting, by_creep = stretch
     sides = Side(*taut, *taut_carry), Side(*slack, *slack_carry)
     return Edges(near.view(bool), value, by_setting, by_creep, *sides)
+
+
+def as_found(edges: Edges) -> tuple[Array, ...]:
+    """What `edges_of` was given, for the compiled filters."""
+    near = np.ascontiguousarray(edges.near).view(np.uint8)
+    stretch = np.array([edges.stretch, edges.stretch_by_setting, edges.stretch_by_creep])
+    return near, stretch, *_readings_and_carry(edges.taut), *_readings_and_carry(edges.slack)
+
+
+def _readings_and_carry(side: Side) -> tuple[Array, Array]:
+    """(3, H, R, n) readings and (3, H, n) what is carried out: values, and slopes by setting error and by creep."""
+    readings = np.array([side.reading, side.by_setting, side.by_creep])
+    return readings, np.array([side.carry, side.carry_by_setting, side.carry_by_creep])
