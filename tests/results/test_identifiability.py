@@ -10,7 +10,7 @@ from scipy import stats
 from wirebayes.effects import effect_named
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
-from wirebayes.model.prior import Prior
+from wirebayes.model.prior import PowerScaled, Prior
 from wirebayes.results import identifiability as module
 from wirebayes.results.identifiability import (
     SENSITIVE,
@@ -303,3 +303,29 @@ def test_no_more_than_four_thousand_draws_are_looked_at_evenly() -> None:
     some = module._thinned(rows)[:, 0]
     assert len(some) == 4000 and (some[0], some[-1]) == (0.0, 9000.0) and set(np.diff(some)) == {2.0, 3.0}
     assert np.array_equal(module._thinned(rows[:7]), rows[:7])
+
+
+def creep_amounts(newtons: float) -> SimpleNamespace:
+    """Draws of a creep amount that is known at a tension of so many newtons, and of its exponent."""
+    rng = np.random.default_rng(5)
+    at_tension = np.exp(rng.normal(0.0, 0.02, 4000))
+    power = np.exp(rng.normal(0.0, 0.1, 4000))
+    distributions = dict.fromkeys(("B", "U"), stats.lognorm(0.7))
+    powers = {"B": PowerScaled("U", float(np.log(newtons)))}
+    prior = Prior(distributions, {}, frozenset(distributions), powers)
+    problem = SimpleNamespace(
+        prior=prior,
+        names=prior.names,
+        log_likelihood=lambda rows: -0.5 * (np.log(prior.known(rows)) ** 2 @ [1.0 / 0.02**2, 1.0 / 0.1**2]),
+    )
+    return SimpleNamespace(problem=problem, flat=np.column_stack([at_tension * newtons**-power, power]))
+
+
+def test_what_is_known_of_a_creep_amount_does_not_depend_on_what_is_called_a_newton() -> None:
+    in_newtons, in_kilonewtons = (identifiability(creep_amounts(newtons)) for newtons in (4000.0, 4.0))
+    for name in ("B", "U"):
+        for key, value in in_newtons[name].items():
+            same = value if isinstance(value, (str, dict)) else pytest.approx(value, rel=1e-9)
+            assert in_kilonewtons[name][key] == same
+    assert in_newtons["B"]["ridges"] == {}  # at 1 N, far below what was tested, B and U are known together only
+    assert in_newtons["B"]["sentence"].startswith("B at the test's typical tension: the data determine it")

@@ -22,7 +22,7 @@ from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.numeric.typing import Array
 from wirebayes.result_warnings import Notice
 from wirebayes.results import hold_ends
-from wirebayes.results.contraction import contraction, source
+from wirebayes.results.contraction import Source, contraction, source
 from wirebayes.results.parameters import unit_of
 from wirebayes.results.posterior_checks import of_posterior
 from wirebayes.wire.effect import Effect, Kinds
@@ -86,10 +86,12 @@ def preview(experiment: Experiment, kinds: Kinds, rng: Generator) -> Preview:
 def _parameters(problem: Problem, theta: Array, before: Array) -> dict[str, ParameterRange]:
     """Each parameter's range by draws (n, d) after and before the test."""
     control = problem.samples[0].protocol.control
+    known_after, known_before = problem.prior.known(theta), problem.prior.known(before)
     out = {}
     for i, name in enumerate(problem.names):
         unit = unit_of(name, (), [control])
-        out[name] = _range(theta[:, i], before[:, i], unit)
+        determined_by = source(contraction(known_after[:, i], known_before[:, i]))
+        out[name] = _range(theta[:, i], before[:, i], unit, determined_by)
     return out
 
 
@@ -101,7 +103,7 @@ def _warnings(problem: Problem, theta: Array, before: Array) -> list[Notice]:
     return of_posterior(own, prior, sample)
 
 
-def _range(draws: Array, before: Array, unit: str) -> ParameterRange:
+def _range(draws: Array, before: Array, unit: str, determined_by: Source) -> ParameterRange:
     """One parameter: its range after and before the test, and what determines it."""
     low, middle, high = np.quantile(draws, [0.05, 0.5, 0.95])
     prior_low, prior_high = np.quantile(before, [0.05, 0.95])
@@ -112,7 +114,7 @@ def _range(draws: Array, before: Array, unit: str) -> ParameterRange:
         "q95": float(high),
         "prior_q05": float(prior_low),
         "prior_q95": float(prior_high),
-        "determined_by": source(contraction(draws, before)),
+        "determined_by": determined_by,
     }
 
 

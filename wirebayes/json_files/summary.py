@@ -47,7 +47,8 @@ class IdentifiabilityFigures(TypedDict):
     `contraction` is 1 - posterior variance / prior variance (of the logarithm, for a positive parameter). The ranges
     are widths of the central 90 %: a factor for a positive parameter, else a difference. The sensitivities are those of
     its posterior to its own prior and to the likelihood. `ridges` has the parameters that it is correlated with, and
-    the correlation.
+    the correlation. Of B and k2 all are those of the creep at the test's typical tension and of the rate over a typical
+    hold, which depend on no unit, unless a prior was stated for B or k2 itself.
     """
 
     contraction: float

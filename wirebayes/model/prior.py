@@ -92,8 +92,11 @@ class Prior:
 
     def rvs(self, n: int, rng: np.random.Generator) -> Array:
         """(n, d) draws."""
-        drawn = [d.rvs(size=n, random_state=rng) for d in self.distributions.values()]
-        return self._from_known(np.column_stack(drawn))
+        return self._from_known(self.known_draws(n, rng))
+
+    def known_draws(self, n: int, rng: np.random.Generator) -> Array:
+        """(n, d) the same draws, of what the distributions are of."""
+        return np.column_stack([d.rvs(size=n, random_state=rng) for d in self.distributions.values()])
 
     def named_draws(self, n: int, rng: np.random.Generator) -> dict[str, Array]:
         """(n,) draws of every parameter, fixed ones included."""

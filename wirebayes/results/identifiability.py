@@ -33,6 +33,9 @@ _DRAWS = 4000  # a 5 % quantile is then one between 4.3 % and 5.7 %
 def identifiability(fitted: Fit) -> dict[str, Identifiability]:
     """How far the data determine each parameter.
 
+    B and k2 in the units of the test, as `Prior.known` has them: at 1 N and after 1 s they are known as badly as these
+    are far from what was tested, and that would depend on what is called a newton.
+
     Parameters
     ----------
     fitted : Fit
@@ -45,37 +48,38 @@ def identifiability(fitted: Fit) -> dict[str, Identifiability]:
     problem = fitted.problem
     prior = problem.prior
     theta = _thinned(fitted.flat)
+    known = prior.known(theta)
     positive = np.array([name in prior.logarithmic for name in problem.names])
-    logs = np.log(np.where(positive, theta, 1.0))
-    z = np.where(positive, logs, theta)
+    logs = np.log(np.where(positive, known, 1.0))
+    z = np.where(positive, logs, known)
     own_prior = log_priors(fitted, theta)
     correlation = np.atleast_2d(np.corrcoef(z.T))
-    drawn = prior.rvs(20000, np.random.default_rng(0))
+    drawn = prior.known_draws(20000, np.random.default_rng(0))
     by_likelihood = distances_per_doubling(z, problem.log_likelihood(theta))
     out: dict[str, Identifiability] = {}
     for i, name in enumerate(problem.names):
         is_factor = bool(positive[i])
         before = drawn[:, i]
-        after = theta[:, i]
+        after = known[:, i]
         (by_prior,) = distances_per_doubling(z[:, [i]], own_prior[:, i])
         figures: IdentifiabilityFigures = {
             "contraction": contraction(after, before),
-            "prior_range_90": _range(_prior_ends(prior, name, before), is_factor),
+            "prior_range_90": _range(prior.distributions[name].ppf(_ENDS), is_factor),
             "posterior_range_90": _range(np.quantile(after, _ENDS), is_factor),
             "range_is_factor": is_factor,
             "prior_sensitivity": by_prior,
             "likelihood_sensitivity": by_likelihood[i],
             "ridges": _ridges(problem.names, correlation, i),
         }
-        out[name] = {**figures, "sentence": parameter_in_words(name, figures)}
+        out[name] = {**figures, "sentence": parameter_in_words(name + _measured_at(prior, name), figures)}
     return out
 
 
-def _prior_ends(prior: Prior, name: str, drawn: Array) -> Array:
-    """Ends of the prior's 90 % interval of a parameter."""
-    if name in prior.powers:
-        return np.quantile(drawn, _ENDS)
-    return prior.distributions[name].ppf(_ENDS)
+def _measured_at(prior: Prior, name: str) -> str:
+    """In which unit a parameter is judged whose unit depends on an exponent, in words; empty for others."""
+    if name not in prior.powers:
+        return ""
+    return " at the test's typical tension" if name.startswith("B") else " over a typical hold"
 
 
 def _range(ends: Array, is_factor: bool) -> float:

@@ -100,7 +100,11 @@ def section(stored: Stored, prior: dict[str, Array], summary: SummaryJson) -> Se
     """
     draws = stored.draws
     sampled = {name: values for name, values in draws.items() if name in prior and np.ptp(values) > 0}
-    shrunk = {name: contraction(values, prior[name]) for name, values in sampled.items()}
+    judged = summary["identifiability"]
+    shrunk = {
+        name: judged[name]["contraction"] if name in judged else contraction(values, prior[name])
+        for name, values in sampled.items()
+    }
     trusted = summary["converged"] and _passed(summary) is not False
     pictures = _pictures(stored, sampled, summary, trusted)
     known = Columns([_measured(stored, summary), *_known(summary, shrunk, trusted)])
