@@ -15,8 +15,11 @@ from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.json_files.summary import CREEP_TIMES_S
 from wirebayes.model.build import build
+from wirebayes.model.spec import PLAIN_SPEC
+from wirebayes.numeric.distributions import Normal
 from wirebayes.results import jobs, read_back, store
 from wirebayes.results.jobs import Job
+from wirebayes.results.netcdf import read_groups
 from wirebayes.simulation.synthetic import Bench, Truth, draw, write_tests
 from wirebayes.wire.staircase import simulate
 
@@ -124,6 +127,21 @@ def test_what_is_fixed_is_read_back_as_it_was_fitted(stated, tmp_path):
             assert stored.draws[name] == pytest.approx(values, rel=1e-12)
         exponent = stored.length_exponent
         assert exponent is None if "N" in stated else exponent.tolist() == [0.0] * len(own["B"])
+
+
+@pytest.mark.parametrize(
+    ("exponent", "attribute", "is_drawn"), [(1.0, 1.0, False), (0.5, 0.5, False), (Normal(1.0, 1.0), None, True)]
+)
+def test_a_file_says_of_the_exponent_of_the_length_what_is_fixed_and_draws_what_is_not(
+    tmp_path, exponent, attribute, is_drawn
+):
+    write_tests(tmp_path, BENCHES, Truth(), 3)
+    experiments = [e.train(4) for e in read_experiments(tmp_path / "experiments.toml")]
+    problem = build(experiments, spec=replace(PLAIN_SPEC, length_exponent=exponent))
+    store.save_posterior(fit_problem(problem, 1, policy=HASTY), tmp_path, {})
+    posterior = read_groups(tmp_path / "posterior.nc", ["posterior"])["posterior"]
+    assert posterior.attributes.get("creep_length_exponent") == attribute
+    assert ("creep_length_exponent" in posterior.variables) == is_drawn
 
 
 def test_an_event_is_read_back_in_its_own_test_alone(tmp_path):

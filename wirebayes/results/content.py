@@ -155,6 +155,7 @@ def _about(fit: Fit, members: Sequence[Sample], provenance: Mapping[str, Any]) -
     lowest = min(own.min() for own in tensions)
     highest = max(own.max() for own in tensions)
     longest = max(protocol.duration_s.max() for protocol in protocols)
+    exponent = fixed_length_exponent(fit.problem, first)  # one that is estimated is among the draws
     return {
         "wirebayes_version": __version__,
         "inference_library": "emcee",
@@ -169,7 +170,7 @@ def _about(fit: Fit, members: Sequence[Sample], provenance: Mapping[str, Any]) -
         "elastic_law": model.law,
         "history": model.history,
         "likelihood": fit.problem.likelihood,
-        LENGTH_EXPONENT: fixed_length_exponent(fit.problem, first),
+        **({} if exponent is None else {LENGTH_EXPONENT: float(exponent)}),
         "effects": _listed(effect.key for effect in all_effects(members)),
         "tension_ref_N": model.tension_ref_N,
         "tension_range_N": [float(lowest), float(highest)],

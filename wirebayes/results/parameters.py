@@ -91,13 +91,13 @@ def _together_variables(problem: Problem, theta: Array) -> dict[str, Array]:
     return out
 
 
-def fixed_length_exponent(problem: Problem, sample: Sample) -> float:
-    """The power of the length that creep grows with among samples fitted together, where it is fixed; otherwise 1."""
+def fixed_length_exponent(problem: Problem, sample: Sample) -> float | None:
+    """The power of the length that creep grows with: 1 among samples of one length, None where it is estimated."""
     try:
         column = problem.column(LENGTH_EXPONENT, sample)
     except KeyError:  # of samples of one length
         return 1.0
-    return float(problem.prior.fixed.get(column, 1.0))
+    return problem.prior.fixed.get(column)
 
 
 def all_effects(samples: Sequence[Sample]) -> tuple[Effect, ...]:
