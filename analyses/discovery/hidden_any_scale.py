@@ -4,7 +4,8 @@
 days and read rarely or often, every second one under weights, each with one hidden effect: in three of five tests one
 that a single test shows, in one of five one that is in no catalogue, and in one of five one that only two lengths of a
 line show, which are then tested both. The tests come from an independent program
-(`analyses.hidden_effects.scaled_draws`), which also says which names look alike there.
+(`analyses.hidden_effects.scaled_draws`), which also says which names look alike there. The size δ of an effect is what
+is left of it, in standard deviations of the noise, beside the parameters that hide it best.
 """
 
 from collections import Counter
@@ -76,7 +77,8 @@ def one(seed: int, index: int) -> dict[str, Any]:
     tests = measured(case, hidden, rng)
     found = investigate(tests, Settings(simulations=SIMULATIONS), own_seed).report["experiments"]
     truth = {"effect": hidden.name, "amplitude": hidden.amplitude, "delta": delta}
-    return row | truth | {"group": list(group(case, hidden, delta)), **answered(found[tests[0].name])}
+    alike = group(case, hidden, case.delta(hidden))
+    return row | truth | {"group": list(alike), **answered(found[tests[0].name])}
 
 
 def answered(found: ExperimentFindings) -> dict[str, Any]:

@@ -1,8 +1,4 @@
-"""One test at any scale and what an effect does to it: sizes, and names that look alike.
-
-An effect's size is what is left of its signature, in standard deviations of the noise, once the plain model's
-parameters have taken theirs. Nothing of the package is used.
-"""
+"""One test at any scale and what an effect does to it, and names that look alike. Nothing of the package is used."""
 
 from __future__ import annotations
 
@@ -17,11 +13,13 @@ from scipy.linalg import solve_triangular
 
 from .rig import Array
 from .scaled_law import Hidden, ScaledTest, readings
+from .scaled_sizes import PLAIN, Signatures, basis_of
 
 SAME_GROUP = 0.95  # |cos| of two projected signatures, from which the names count as one
-PLAIN = ("k1", "B", "U", "k2", "N", "preload")
+# what is known of a line before its test, as docs say of the default priors: standard deviations of logarithms, and of
+# the preload in stretches
+KNOWN = {"k1": 1.5, "B": 1.5, "U": 0.7, "k2": 1.5, "N": 0.45, "preload": 0.3}
 _DIFFERENCE = 1e-4
-_FIRST, _STEPS = 0.02, 20  # share of the largest sensible amplitude that is tried first, and how many are tried
 _NEARLY = 0.15  # relative error of a size that is only compared by its direction
 
 
@@ -87,115 +85,6 @@ UNKNOWN = "unknown"  # what is said of an effect that is in no catalogue
 
 
 @dataclass(frozen=True)
-class _Guess:
-    """A share of the largest amplitude that is tried, between one too small and one too large.
-
-    Attributes
-    ----------
-    share, low, high : float
-    power : float
-        How the size of the effect grows with the amplitude, from the last two tries.
-    before : (float, float)
-        The last share and its size.
-    """
-
-    share: float = _FIRST
-    low: float = 0.0
-    high: float = np.inf
-    power: float = 1.0
-    before: tuple[float, float] = (0.0, 0.0)
-
-    def next(self, size: float, delta: float) -> _Guess:
-        """What to try after a share that has this size."""
-        share, power, (last, last_size) = self.share, self.power, self.before
-        low, high = (share, self.high) if size < delta else (self.low, share)
-        if last and share != last and 0.0 < size < np.inf and 0.0 < last_size < np.inf:
-            power = float(np.clip(np.log(size / last_size) / np.log(share / last), 0.4, 4.0))
-        wanted = float(np.clip(delta / max(size, 1e-12), 1e-3, 1e3))
-        after = min(1.0, share * wanted ** (1.0 / power))
-        if not low < after < high:
-            after = float(np.sqrt(max(low, 1e-3 * high) * min(high, 1.0)))
-        return _Guess(after, low, high, power, (share, size))
-
-
-class Signatures:
-    """What effects do to readings, and how large they are beside the noise and what parameters can absorb."""
-
-    def noise_free(self, hidden: Hidden = Hidden()) -> Array:  # noqa: B008 - it is frozen
-        """Readings without noise."""
-        raise NotImplementedError
-
-    def largest(self, name: str) -> float:
-        """Largest sensible amplitude of an effect."""
-        raise NotImplementedError
-
-    def whitened(self, dy: Array) -> Array:
-        """Readings in standard deviations of the noise, which are independent."""
-        raise NotImplementedError
-
-    @cached_property
-    def basis(self) -> Array:
-        """Orthonormal columns, whitened, of what parameters can absorb."""
-        raise NotImplementedError
-
-    @cached_property
-    def plain(self) -> Array:
-        """Readings without noise and without an effect."""
-        return self.noise_free()
-
-    def projected(self, dy: Array) -> Array:
-        """The same less what the plain parameters can absorb."""
-        z = self.whitened(dy)
-        return np.asarray(z - self.basis @ (self.basis.T @ z))
-
-    def signature(self, hidden: Hidden) -> Array:
-        """What an effect does to the readings, projected."""
-        return self.projected(self.noise_free(hidden) - self.plain)
-
-    def delta(self, hidden: Hidden) -> float:
-        """Size of an effect; infinite where the wire cannot carry its weights with it."""
-        size = float(np.linalg.norm(self.signature(hidden)))
-        return size if np.isfinite(size) else np.inf
-
-    def of_delta(self, hidden: Hidden, delta: float, agrees: float = 0.02) -> Hidden | None:
-        """The effect with an amplitude of that size; none where no sensible one has it.
-
-        Parameters
-        ----------
-        hidden : Hidden
-            Of its amplitude only the sign counts.
-        delta : float
-        agrees : float
-            Relative error of the size.
-        """
-        most, sign = self.largest(hidden.name), float(np.sign(hidden.amplitude))
-        guess = _Guess()
-        for _ in range(_STEPS):
-            found = replace(hidden, amplitude=sign * guess.share * most)
-            size = self.delta(found)
-            if abs(size / delta - 1.0) < agrees:
-                return found
-            if size < delta and guess.share >= 1.0:
-                return None
-            guess = guess.next(size, delta)
-        return None
-
-    def shown(self) -> list[str]:
-        """Effects of the catalogue that these readings could show."""
-        raise NotImplementedError
-
-    def forms(self, name: str, rng: np.random.Generator | None = None) -> Iterator[Hidden]:
-        """An effect with each sign and several values of its constants, or one drawn at random; without its size."""
-        raise NotImplementedError
-
-
-def basis_of(columns: Array) -> Array:
-    """Orthonormal columns that span those of (N, p) that can be told apart."""
-    left, sizes, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
-    return np.asarray(left[:, sizes > 1e-7 * sizes[0]], np.float64)
-
-
-@dataclass(frozen=True)
 class ScaledCase(Signatures):
     """A test of a line, its truth and noise.
 
@@ -251,6 +140,19 @@ class ScaledCase(Signatures):
         step = _DIFFERENCE * (self.about["stretch_mm"] if name == "preload" else self.truth[name])
         up, down = (replace(self, truth=self.truth | {name: self.truth[name] + d}) for d in (step, -step))
         return (up.plain - down.plain) / (2.0 * step)
+
+    def moved(self, by: Array) -> Array:
+        return self.with_parameters(dict(zip(PLAIN, by, strict=True))).plain
+
+    def with_parameters(self, by: dict[str, float]) -> ScaledCase:
+        """The same test of a line whose parameters differ by so many of `KNOWN`."""
+        far = {name: KNOWN[name] * value for name, value in by.items()}
+        truth = self.truth | {name: self.truth[name] * float(np.exp(far[name])) for name in ("k1", "B", "U", "k2", "N")}
+        # what is known of creep is that of the typical tension, and of its rate that of a hold
+        truth["B"] *= self.test.tension_ref_N ** (self.truth["U"] - truth["U"])
+        truth["k2"] *= float(np.median(self.test.durations_s)) ** (self.truth["N"] - truth["N"])
+        truth["preload"] = self.truth["preload"] + far["preload"] * self.about["stretch_mm"]
+        return replace(self, truth=truth)
 
     def whitened(self, dy: Array) -> Array:
         return np.asarray(solve_triangular(self._factor, dy, lower=True, check_finite=False))

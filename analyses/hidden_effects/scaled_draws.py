@@ -12,12 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .rig import Array
-from .scaled_cases import OF_LENGTHS, ScaledCase, Signatures
+from .scaled_cases import OF_LENGTHS, ScaledCase
 from .scaled_law import Hidden, ScaledTest
 from .scaled_lengths import TwoLengths
+from .scaled_sizes import Signatures
 
 DELTAS = (5.0, 8.0, 12.0)
 _TRIES = 40  # draws of an effect, of which one can be as large as it should
+_AGREES = 0.05  # relative error of the size of what is hidden
 _UNEVEN, _LOGGED = 0.3, 0.25  # shares of tests with uneven steps, and with a temperature
 _REST = 1.4  # of a hold, until the next move, where the wire rests before it
 
@@ -145,7 +147,7 @@ def draw_hidden(case: Signatures, rng: np.random.Generator, names: Sequence[str]
     names = names or case.shown()
     for _ in range(_TRIES):
         (form,) = case.forms(str(rng.choice(names)), rng)
-        found = case.of_delta(form, delta)
+        found = case.of_delta(form, delta, _AGREES, case.left)
         if found is not None:
             return found, delta
     return None

@@ -9,8 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from .rig import Array
-from .scaled_cases import EVERY, OF_LENGTHS, PLAIN, ScaledCase, Signatures, basis_of
+from .scaled_cases import EVERY, OF_LENGTHS, ScaledCase
 from .scaled_law import Hidden
+from .scaled_sizes import PLAIN, Signatures, basis_of
 
 DEPENDENT = ("k1", "B", "U", "N")  # parameters that may depend on the length beyond what the plain model says
 _OF_ONE_TEST = ("grip_slip", "unrecorded_hold", "prior_creep")
@@ -55,6 +56,16 @@ class TwoLengths(Signatures):
         first = len(self.parts[0].plain)
         rows = (dy[:first], dy[first:])
         return np.concatenate([part.whitened(own) for part, own in zip(self.parts, rows, strict=True)])
+
+    @property
+    def moves(self) -> int:
+        return len(PLAIN) + 1
+
+    def moved(self, by: Array) -> Array:
+        """The last two are the preloads."""
+        common, preloads = by[: len(PLAIN) - 1], by[len(PLAIN) - 1 :]
+        each = [np.append(common, preload) for preload in preloads]
+        return np.concatenate([part.moved(own) for part, own in zip(self.parts, each, strict=True)])
 
     @cached_property
     def basis(self) -> Array:
