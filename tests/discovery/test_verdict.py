@@ -364,7 +364,7 @@ def test_an_effect_that_gains_exactly_four_does_not_predict(monkeypatch: pytest.
     assert names(decided(monkeypatch, explored({"a": 10.0}), {"a": -9.0}, {})) == "a"
 
 
-def retested(monkeypatch: pytest.MonkeyPatch, p: float) -> tuple[Any, list[Any], Any]:
+def retested(monkeypatch: pytest.MonkeyPatch, p: float, *enough: Any) -> tuple[Any, list[Any], Any]:
     """The second test of a set on two blocks, where p is as given, its blocks, and what was simulated."""
     blocks: Any = [
         SimpleNamespace(target=SimpleNamespace(problem=f"p{b}"), z=np.array([[b]]), names=[f"n{b}", "m"])
@@ -400,7 +400,7 @@ def retested(monkeypatch: pytest.MonkeyPatch, p: float) -> tuple[Any, list[Any],
     monkeypatch.setattr(retest, "expand", expand)
     monkeypatch.setattr(retest, "scan", lambda x: x)
     best: Any = SimpleNamespace(blocks=blocks, probed=(["t1", "t2"], ["candidate"]))
-    return blocks, asked, retest.retested(best, np.random.default_rng(0), map)
+    return blocks, asked, retest.retested(best, np.random.default_rng(0), map, *enough)
 
 
 def test_the_second_test_has_the_effects_of_the_set_inside(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -422,6 +422,31 @@ def test_the_second_test_takes_half_of_its_simulations_where_p_is_clearly_above_
     sizes = [n for _, n in asked]
     assert sizes == [75] * 4 if decides else sizes == [75] * 4 + [75, 74] * 2
     assert all(("and 74" in item[3]) != decides for item in found.where)
+
+
+@pytest.mark.parametrize(("larger", "decides"), [(0, True), (1, False), (9, False), (10, True)])
+def test_where_only_the_side_of_the_level_counts_no_simulation_as_surprising_decides_too(
+    larger: int, decides: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, asked, _ = retested(monkeypatch, (1 + larger) / 101, retest._is_decided)
+    assert (len(asked) == 4) == decides
+
+
+def test_of_a_set_that_may_replace_the_best_one_only_the_side_of_the_level_counts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = []
+
+    def fails_both(best: Any, rng: Any, parallel_map: Any, *enough: Any) -> Retest:
+        asked.append((best.effects.names, enough))
+        return Retest(0.01, [[]])
+
+    sets = explored({"a": 20.0, "b": 19.0})
+    found = decided(monkeypatch, sets, {}, {})
+    monkeypatch.setattr(retest, "retested", fails_both)
+    best = sets.fitted[found.best.effects.key]  # type: ignore[union-attr]
+    assert retest.complete(found.posterior, sets, best, lambda one: True, np.random.default_rng(0), map) is None
+    assert asked == [(("b",), (retest._is_decided,))]
 
 
 def test_a_remainder_that_fails_the_test_may_leave_no_effect(monkeypatch: pytest.MonkeyPatch) -> None:

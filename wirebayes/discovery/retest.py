@@ -12,7 +12,7 @@ from wirebayes.discovery.global_test import is_close, with_more
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.model_space import ModelPosterior, largest_first
 from wirebayes.discovery.scans import Scan
-from wirebayes.discovery.screening import Replicates
+from wirebayes.discovery.screening import GlobalTest, Replicates
 from wirebayes.discovery.settings import ALPHA_AFTER, GIVE_WAY, MOST_RETESTS, RETESTS
 from wirebayes.json_files.discovery import Disagreement
 from wirebayes.processes.workers import ParallelMap
@@ -84,17 +84,34 @@ def complete(
         if candidate is best:
             continue
         if predicts(candidate):
-            retest = retested(candidate, rng, parallel_map)
+            retest = retested(candidate, rng, parallel_map, _is_decided)
             if not fails(retest):
                 return _Passing(candidate, retest, failed)
         failed.add(key)
     return None
 
 
-def retested(best: FittedSet, rng: Generator, parallel_map: ParallelMap) -> Retest:
-    """The global test with the set inside, and where its residuals still depend on something.
+def _is_passed(test: GlobalTest) -> bool:
+    """Whether p is clearly above the level: below it, the odds of a remainder depend on how small p is."""
+    return test.p > ALPHA_AFTER and not is_close(test.p, ALPHA_AFTER, len(test.null))
 
-    Half of the simulations decide where p is clearly above the level; below it, the odds depend on how small p is.
+
+def _is_decided(test: GlobalTest) -> bool:
+    """Whether p is clearly on one side of the level, where nothing depends on how small it is.
+
+    Below it is where not one of half of the simulations is as surprising. Whatever the true p, these then disagree with
+    all of them in four files of a thousand at most: none of 100, and six of 100 more.
+    """
+    return _is_passed(test) or test.p <= 1.0 / (1 + len(test.null))
+
+
+def retested(
+    best: FittedSet,
+    rng: Generator,
+    parallel_map: ParallelMap,
+    enough: Callable[[GlobalTest], bool] = _is_passed,
+) -> Retest:
+    """The global test with the set inside, and where its residuals still depend on something.
 
     Parameters
     ----------
@@ -102,6 +119,8 @@ def retested(best: FittedSet, rng: Generator, parallel_map: ParallelMap) -> Rete
     rng : numpy.random.Generator
     parallel_map : function
         The built-in `map`, or one over processes.
+    enough : function of a GlobalTest
+        Whether half of the simulations are enough.
     """
     trials, candidates = best.probed
     if not candidates:
@@ -114,7 +133,7 @@ def retested(best: FittedSet, rng: Generator, parallel_map: ParallelMap) -> Rete
         x = expand(target, block.z, trials, columns=columns)
         listed.append(own_patterns)
         data.append(scan(x))
-    p, nulls = _tested(best, data, rng, parallel_map)
+    p, nulls = _tested(best, data, rng, parallel_map, enough)
     where = []
     for block, own_patterns, here, null in zip(best.blocks, listed, data, nulls, strict=True):
         names = ", ".join(block.names)
@@ -123,9 +142,13 @@ def retested(best: FittedSet, rng: Generator, parallel_map: ParallelMap) -> Rete
 
 
 def _tested(
-    best: FittedSet, data: Sequence[Scan], rng: Generator, parallel_map: ParallelMap
+    best: FittedSet,
+    data: Sequence[Scan],
+    rng: Generator,
+    parallel_map: ParallelMap,
+    enough: Callable[[GlobalTest], bool],
 ) -> tuple[float, list[Scan]]:
-    """The p of the global test beside a set, and the scans of simulations; half of these are enough for a clear p."""
+    """The p of the global test beside a set, and the scans of simulations, of which half may be enough."""
     trials, candidates = best.probed
     simulated: list[Replicates] = []
     half = RETESTS // 2
@@ -133,6 +156,6 @@ def _tested(
         simulated = with_more(simulated, best.blocks, trials, n, rng, parallel_map)
         nulls = [s.scan for s in simulated]
         test = screening.global_test(candidates, data, nulls)
-        if test.p > ALPHA_AFTER and not is_close(test.p, ALPHA_AFTER, len(test.null)):
+        if enough(test):
             break
     return test.p, nulls
