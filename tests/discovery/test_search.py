@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,8 @@ from analyses.hidden_effects.cases import Spec, seal
 from tests.simulated import WIRE
 from wirebayes import cli
 from wirebayes.discovery import held_out, linear_scan, next_measurement, noise_integral, power, screening
-from wirebayes.discovery.investigation import final_models
+from wirebayes.discovery.alternatives import Alternative
+from wirebayes.discovery.investigation import Concluded, alternative_models, final_models
 from wirebayes.discovery.probes import probes
 from wirebayes.discovery.search import catalogue_without, investigate
 from wirebayes.discovery.settings import REMAINS, Settings
@@ -298,3 +300,12 @@ def test_the_gap_is_measured_against_the_noise_floor() -> None:
     assert held_out.gap_closed(held(0.10), held(0.01)) == pytest.approx(1.0)
     assert held_out.gap_closed(held(0.10), held(0.10)) == pytest.approx(0.0)
     assert held_out.gap_closed(held(0.005), held(0.004)) is None
+
+
+def test_an_undecided_model_is_sampled_by_its_share_and_the_final_one_in_full() -> None:
+    fits: list[Any] = [SimpleNamespace(experiments=(), effects=(name,), best={}) for name in ("toe", "ageing")]
+    both = [Alternative(fits[0], False, 0.7), Alternative(fits[1], False, 0.3)]
+    found = Concluded((fits[0],), (False,), (both,))
+    assert [model.share for model in final_models(found)] == [1.0]
+    [[other]] = alternative_models(found)
+    assert other.effects == ("ageing",) and other.share == 0.3

@@ -250,7 +250,8 @@ def _job(kind: str, model: JointModel, spec: ModelSpec, own_effects: Path | None
     folders = tuple(f"{experiment.name}/{kind}" for experiment in experiments)
     keys = tuple(effect.key for effect in model.effects)
     hashes = {experiment.name: experiment.data_hash for experiment in experiments}
-    return Job(folders[0], experiments, keys, own_effects, spec, {"data_sha256": hashes}, model.near, folders)
+    about = {"data_sha256": hashes}
+    return Job(folders[0], experiments, keys, own_effects, spec, about, model.near, folders, model.share)
 
 
 def _others(found: Concluded) -> list[tuple[int, JointModel]]:

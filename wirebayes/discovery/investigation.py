@@ -1,6 +1,6 @@
 """What a search has found in a file, and the models of it that are sampled."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from wirebayes.discovery import shrinking
 from wirebayes.discovery.alternatives import Alternative
@@ -44,11 +44,22 @@ class Investigation(Concluded):
 
 @dataclass(frozen=True)
 class JointModel:
-    """What is sampled at once: some experiments with some effects, and where the best parameters are, if known."""
+    """What is sampled at once.
+
+    Attributes
+    ----------
+    experiments : tuple of Experiment
+    effects : tuple of Effect
+    near : dict, optional
+        Where the best parameters are, if known.
+    share : float
+        Of the draws of an answer, that come from this model.
+    """
 
     experiments: tuple[Experiment, ...]
     effects: tuple[Effect, ...] = ()
     near: dict[str, float] | None = None
+    share: float = 1.0
 
 
 def final_models(findings: Concluded) -> list[JointModel]:
@@ -65,7 +76,12 @@ def final_models(findings: Concluded) -> list[JointModel]:
 
 def alternative_models(findings: Concluded) -> list[list[JointModel]]:
     """The other models that stay undecided beside the final ones, each as what is sampled for it."""
-    return [_sampled(other.block, other.remains) for others in findings.undecided for other in others[1:]]
+    out = []
+    for others in findings.undecided:
+        for other in others[1:]:
+            models = _sampled(other.block, other.remains)
+            out.append([replace(model, share=other.probability) for model in models])
+    return out
 
 
 def _sampled(block: LaplaceFit, remains: bool) -> list[JointModel]:

@@ -37,6 +37,8 @@ class Job:
         Parameters known to be good (see `wirebayes.inference.fit.fit_problem`).
     apart : tuple of str
         Folders of the experiments, one each, where they are stored apart; all in one when left out.
+    share : float
+        Of the draws of an answer, that come from this fit.
     """
 
     folder: str
@@ -47,6 +49,7 @@ class Job:
     provenance: dict[str, Any] = field(default_factory=dict)
     near: dict[str, float] | None = None
     apart: tuple[str, ...] = ()
+    share: float = 1.0
 
     @property
     def folders(self) -> tuple[str, ...]:
@@ -136,7 +139,8 @@ def one(
     for place in job.folders:
         (directory / place).mkdir(parents=True, exist_ok=True)
     checkpoint = directory / job.folder / ".checkpoint"
-    store(job, fit_job(job, seed, policy, checkpoint, progress), directory, seed, policy)
+    own_policy = policy.of_share(job.share)
+    store(job, fit_job(job, seed, own_policy, checkpoint, progress), directory, seed, own_policy)
     checkpoint.unlink(missing_ok=True)
 
 
