@@ -37,6 +37,10 @@ STUDIES = {
         "-m analyses.discovery.clean_any_scale --rows {folder} --output {folder}/clean.json",
         "clean.json",
     ),
+    "null_under_weights": (
+        "-m analyses.discovery.null_under_weights --tests 200 --rows {folder} --output {folder}/null.json",
+        "null.json",
+    ),
     "hidden_any_scale": (
         "-m analyses.discovery.hidden_any_scale --tests 29 --rows {folder} --output {folder}/hidden.json",
         "hidden.json",
@@ -150,6 +154,7 @@ def texts() -> dict[Path, str]:
         DOCS / "real-files.inc": intervals.public_recordings(kept["real_files"]),
         DOCS / "weights.inc": intervals.steps_and_weights(kept["weights"]),
         DOCS / "clean-any-scale.inc": discovery.false_alarms_at_any_scale(kept["clean_any_scale"]),
+        DOCS / "null-under-weights.inc": discovery.p_under_weights(kept["null_under_weights"]),
         DOCS / "hidden-any-scale.inc": discovery.hidden_effects_at_any_scale(kept["hidden_any_scale"]),
         DOCS / "calibration.inc": intervals.ranks(kept["calibration"]),
         DOCS / "wires-before.inc": intervals.wires_before(kept["wires_before"]),

@@ -38,6 +38,18 @@ def false_alarms_at_any_scale(kept: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def p_under_weights(kept: dict[str, Any]) -> str:
+    """A sentence on the p of clean tests under weights, by simulations at the fit and at the truth."""
+    found = kept["result"]
+    level = f"{found['alpha']:g}"
+    at_fit, at_truth = (f"{found[by][level]['k']} ({_share(found[by][level])} %)" for by in ("fit", "truth"))
+    said = (
+        f"{run_of(kept)}: of {found['tests']} tests, {at_fit} have a p of at most {level} by simulations at the fit, "
+        f"as the check makes them, and {at_truth} by simulations at the truth, with which p is uniform."
+    )
+    return fill(said, 110, break_on_hyphens=False) + "\n"
+
+
 def hidden_effects_at_any_scale(kept: dict[str, Any]) -> str:
     """A paragraph and a table on hidden effects in tests of any scale."""
     found = kept["result"]
