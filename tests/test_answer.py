@@ -177,6 +177,23 @@ def test_a_comparison_says_errors_with_units_and_the_command_of_the_best_model(t
     assert found.next_step(Given("w.toml")) == "wirebayes fit w.toml\nwirebayes discover w.toml"
 
 
+@pytest.mark.parametrize(
+    ("elpd", "then", "next_"),
+    [
+        (7.6, ", which may be chance; then plain", "fit w.toml"),
+        (9.6, ", then plain", "fit w.toml --effect grip_slip@3"),
+    ],
+)
+def test_a_lead_that_may_be_chance_is_said_and_not_followed(tmp_path: Path, elpd: float, then: str, next_: str) -> None:
+    law = {"elastic_law": "hooke", "history": "saturating", "likelihood": "chain", "failed": None}
+    best = law | {"name": "slip", "effects": ["grip_slip@3"], "difference": {"elpd": elpd, "se": 4.3}}
+    plain = law | {"name": "plain", "effects": [], "difference": {"elpd": 0.0, "se": 0.0}}
+    table = {"base": "plain", "models": [best, plain]}
+    found = stored(Comparison, tmp_path, "comparison.json", {"experiments": {"w": table}})
+    assert found.lines() == [f"w: slip predicts left-out holds best{then}"]
+    assert found.next_step(Given("w.toml")) == f"wirebayes {next_}\nwirebayes discover w.toml"
+
+
 def test_a_pose_that_cannot_be_held_says_why(tmp_path: Path) -> None:
     found = stored(Pose, tmp_path, "pose.json", {"robot": "r", "feasible": False, "sentence": "Too heavy."})
     assert found.lines() == ["r: Too heavy."]

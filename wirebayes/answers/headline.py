@@ -6,7 +6,7 @@ import numpy as np
 
 from wirebayes.answers.creep import creep_as_long_as_held, lengths_in_words
 from wirebayes.answers.terminal import MOST_OUTLIERS, missing_in
-from wirebayes.answers.verdict import control_judged, verdict_in_words, what_it_is
+from wirebayes.answers.verdict import control_judged, is_more_than_chance, verdict_in_words, what_it_is
 from wirebayes.json_files.batch import BatchJson, Row
 from wirebayes.json_files.calibrate import CalibrateJson
 from wirebayes.json_files.check import CheckedExperiment
@@ -188,7 +188,7 @@ def comparison_in_words(name: str, table: ComparedModels) -> str:
         gain, against = {**loss, "elpd": -loss["elpd"]}, spoken(second["name"])
     if gain is not None and against != model:
         text += f", {_ahead(gain)} against {against}"
-        text += _by_chance(gain)
+        text += "" if is_more_than_chance(gain) else ", which may be chance"
     if others:
         come = "come" if len(others) > 1 else "comes"
         names = [spoken(row["name"]) for row in others]
@@ -201,12 +201,6 @@ def _ahead(gain: Difference) -> str:
     """How much better a model predicts."""
     elpd, error = number(gain["elpd"], 2), number(gain["se"], 2)
     return f"by {elpd} ± {error} elpd (log probability of their readings)"
-
-
-def _by_chance(gain: Difference) -> str:
-    from wirebayes.comparison.compare import meaningful  # loaded by now, and by no other command
-
-    return "" if meaningful(gain["elpd"], gain["se"]) else ", which may be chance"
 
 
 def _how_many(rows: Sequence[Row]) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 from wirebayes.answers.creep import creep_as_long_as_held, lengths_in_words
-from wirebayes.answers.verdict import control_judged, verdict_in_words, what_it_is
+from wirebayes.answers.verdict import control_judged, lead_may_be_chance, verdict_in_words, what_it_is
 from wirebayes.json_files.batch import BatchJson, Row
 from wirebayes.json_files.check import CheckedExperiment, EffectSize, HoldUnderstood, ParameterRange
 from wirebayes.json_files.comparison import ComparedModel, ComparedModels
@@ -335,6 +335,8 @@ def of_comparison(name: str, table: ComparedModels) -> list[str]:
     shown, rest = rows[:3], rows[3:]
     best, *others = [spoken(row["name"]) for row in shown]
     then = f", then {listed(others)}" if others else ""
+    if lead_may_be_chance(table):
+        then = f", which may be chance; then {listed(others)}"
     shown += [row for row in rest if row["name"] == table["base"]]
     errors = [_error_ahead(row) for row in shown]
     scored = [error for error in errors if error]
@@ -352,12 +354,15 @@ def _error_ahead(row: ComparedModel) -> str:
 
 
 def options_of_best(table: ComparedModels) -> str | None:
-    """What `wirebayes fit` needs for the model that predicts best; None for one that options alone do not describe."""
+    """What `wirebayes fit` needs for the model that predicts best; None for one that options alone do not describe.
+
+    Where its lead may be chance, for the one that all are compared with.
+    """
     rows = {row["name"]: row for row in table["models"] if row["failed"] is None}
     base = rows.get(table["base"])
     if base is None:
         return None
-    best = next(iter(rows.values()))
+    best = base if lead_may_be_chance(table) else next(iter(rows.values()))
     effects = best.get("effects", [])
     if not all(what_it_is(effect) for effect in effects):
         return None

@@ -1,6 +1,7 @@
 """A verdict in words, and what an effect is."""
 
 from wirebayes.effects import CATALOGUE
+from wirebayes.json_files.comparison import ComparedModels, Difference
 from wirebayes.json_files.discovery import ExperimentFindings
 from wirebayes.json_files.read_units import unit_read
 from wirebayes.sentences import likely
@@ -37,3 +38,19 @@ def what_it_is(effect: str, control: Control = "displacement") -> str:
         return ""
     first = kind.sentence_under(control).split(". ")[0].rstrip(".")
     return first[:1].lower() + first[1:]
+
+
+def lead_may_be_chance(table: ComparedModels) -> bool:
+    """Whether the model that predicts best is ahead of the one that all are compared with by no more than chance."""
+    best = next((row for row in table["models"] if row["failed"] is None), None)
+    if best is None or best["name"] == table.get("base"):
+        return False
+    gain = best.get("difference")
+    return gain is not None and not is_more_than_chance(gain)
+
+
+def is_more_than_chance(gain: Difference) -> bool:
+    """Whether a difference of elpd means anything."""
+    from wirebayes.comparison.compare import meaningful  # loaded by now, and by no other command
+
+    return meaningful(gain["elpd"], gain["se"])
