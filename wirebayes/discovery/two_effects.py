@@ -116,10 +116,11 @@ def _explained(x: Expansion, found: Projected, first: Ints) -> Array:
     leading = _Signatures.chosen(found, first)
     cross = found.form.of(first).products(found.form, found.shrink)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        of_leading = leading.beside(each, cross)
-        of_each = each.beside(leading, cross)
+        determinant = leading.square * each.square - cross**2
+        of_leading = leading.beside(each, cross) / determinant
+        of_each = each.beside(leading, cross) / determinant
         explained = of_leading * leading.along + of_each * each.along
-        are_two = leading.determinant(each, cross) > LEAST_LEFT * leading.square * each.square
+        are_two = determinant > LEAST_LEFT * leading.square * each.square
     possible = are_two & np.isfinite(explained)
     either_sign = ~x.one_sided
     possible &= (of_leading >= 0.0) | either_sign[first][:, None, :, None]
@@ -141,11 +142,9 @@ class _Signatures(NamedTuple):
         square = np.take_along_axis(found.divisor, at, axis=2)
         return cls(along[..., None], square[..., None])
 
-    def determinant(self, other: "_Signatures", cross: Array) -> Array:
-        """Determinants of the (2, 2) products of pairs, `cross` being those of one with the other."""
-        return self.square * other.square - cross**2
-
     def beside(self, other: "_Signatures", cross: Array) -> Array:
-        """Best amplitudes with the others at their best."""
-        free = other.square * self.along - cross * other.along
-        return free / self.determinant(other, cross)
+        """Best amplitudes with the others at their best, times the determinant of their products.
+
+        Of these `cross` are those of one with the other.
+        """
+        return other.square * self.along - cross * other.along

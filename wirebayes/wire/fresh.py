@@ -24,7 +24,7 @@ from wirebayes.wire.model import Model
 from wirebayes.wire.walk import Theta
 
 _LOG_TIMES = -50.0, 700.0  # logarithms of the times between which the median creep time is looked for
-_HALVINGS = 60  # 750 over two to the 60th is less than rounding
+_HALVINGS = 44  # 750 over two to the 44th: ten digits of a time
 
 
 @dataclass(frozen=True)
