@@ -197,7 +197,9 @@ def test_what_the_plain_model_takes_up_and_what_a_protocol_cannot_show_is_said(m
         ("_Compliance", "compliance of the fixture.c"),
     ]
     assert trials == [(kind, {column: 1e-3}, 1e-3, False) for kind, column in names]
-    power.not_identifiable(block, kinds, ["fixture_compliance", "superposition"])
+    with_compliance: Any = [*kinds, SimpleNamespace(name="fixture_compliance", shows="needs two lengths")]
+    found = power.not_identifiable(block, with_compliance, ["superposition"])
+    assert sum("compliance" in sentence for sentence in found) == 1
     assert [t[0] for t in asked[1][2]] == ["_SensorGain", "_ForceOffset", "_DisplacementScale"]
     block.experiments[0].control = "force"
     hung = power.not_identifiable(block, kinds, ["superposition"])

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from wirebayes.cli import main
 from wirebayes.errors import InputError
+from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.policy import Policy
 from wirebayes.io import paper
 from wirebayes.model.spec import ModelSpec
@@ -30,8 +31,12 @@ from wirebayes.report.blocks import (
 )
 from wirebayes.report.drawn import drawn, svg
 from wirebayes.report.page import render, write_page
+from wirebayes.report.pages import fit as fit_page
 from wirebayes.results.jobs import Job, run
+from wirebayes.results.read_back import load_posterior
+from wirebayes.results.store import save_posterior
 from wirebayes.sentences import quantity
+from wirebayes.simulation.synthetic import Bench, Truth, draw
 
 MOST_BYTES = 1_500_000
 _VOID = {"meta", "img", "link", "br", "hr", "input"}
@@ -584,3 +589,11 @@ def test_a_long_name_stays_within_its_cell(name: str, lines: list[str]) -> None:
 )
 def test_a_sentence_begins_with_a_large_letter_unless_it_begins_with_a_name(text, sentence):
     assert as_sentence(text) == sentence
+
+
+def test_what_is_left_of_displacements_is_in_mm(tmp_path):
+    """Under weights displacements are read."""
+    made = draw([Bench(times_s=(0.0, 30.0, 60.0), weights_N=(2.0, 4.0, 6.0), resolution_mm=0.0)], Truth(), 3)
+    save_posterior(fit_problem(made.problem, 1, policy=_FAST), tmp_path, {})
+    stored = load_posterior(tmp_path)
+    assert fit_page._residuals(stored).axes[0].get_ylabel() == "measured − predicted, mm"

@@ -292,7 +292,8 @@ def not_identifiable(block: LaplaceFit, kinds: Sequence[type[Effect]], possible:
     controls: list[Control] = sorted({e.control for e in block.experiments})
     out = []
     for control in controls:
-        known: list[type[Effect]] = [_Compliance] if "fixture_compliance" in possible else []
+        of_catalogue = any(kind.name == "fixture_compliance" for kind in kinds)  # which then says it by that name
+        known: list[type[Effect]] = [_Compliance] if of_catalogue else []
         if control == "force":
             known.append(_DisplacementScale)  # there it is the gain of the sensor
         of_which = f" ({WORD[control]})" if len(controls) > 1 else ""

@@ -223,40 +223,43 @@ def _with_thin_spaces(value: float, _: int | None) -> str:
 def residual_figure(
     hold: Array,
     time_s: Array,
-    measured_N: Array,
-    band_N: Array,
+    measured: Array,
+    band: Array,
     title: str,
     colour: str = CHAIN,
     paper_N: Array | None = None,
+    unit: str = "N",
 ) -> Figure:
     """Measured minus predicted, hold after hold, inside the 90 % band.
 
     Parameters
     ----------
-    hold, time_s, measured_N : (m,) arrays
-    band_N : (3, m) array
+    hold, time_s, measured : (m,) arrays
+    band : (3, m) array
         5 %, 50 % and 95 % of the prediction.
     paper_N : (m,) array, optional
         The paper's prediction.
+    unit : str
+        Of what was measured: mm under weights.
     """
     across = "hold (readings in order of time within each)"
-    upward = "measured − predicted, N"
+    upward = f"measured − predicted, {unit}"
     figure, axes = panel(across, upward, title)
     numbers, place = places_in_holds(hold, time_s)
     is_last = np.diff(hold) != 0
     ends = np.flatnonzero(is_last) + 1
-    low, middle, high = np.insert(band_N, ends, np.nan, axis=1)  # a gap between holds
+    low, middle, high = np.insert(band, ends, np.nan, axis=1)  # a gap between holds
     band_place = np.insert(place, ends, np.nan)
     lower, upper = low - middle, high - middle
     axes.fill_between(band_place, lower, upper, color=colour, alpha=0.22, lw=0, label="90 % band")
     axes.axhline(0, color=colour, lw=1)
-    median = band_N[1]
-    left = measured_N - median
+    median = band[1]
+    left = measured - median
     axes.scatter(place, left, s=14, color=colour, zorder=3, label="measured − posterior median")
     columns = 3
     if paper_N is not None:
         columns = 2
-        theirs = measured_N - paper_N
+        theirs = measured - paper_N
         axes.scatter(place, theirs, s=18, marker="x", lw=1, color=INK, zorder=2, label="measured − paper's curve")
     names = [str(number) for number in numbers]
     axes.set_xticks(range(len(names)), names)

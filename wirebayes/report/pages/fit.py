@@ -41,6 +41,7 @@ from wirebayes.results.contraction import MOST, contraction
 from wirebayes.results.parameters import unit_of
 from wirebayes.results.read_back import Stored, load_with_priors
 from wirebayes.sentences import counted, lasting, listed, middle_and_span
+from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.protocol import Control
 
@@ -353,7 +354,8 @@ def _residuals(stored: Stored) -> Figure:
     measured = readings[wanted]
     title = f"{sample.name}, {figures.WORDS[kind]}"
     colour = figures.COLOURS[kind]
-    return figures.residual_figure(hold, time_s, measured, band, title, colour)
+    unit = READ_UNIT[protocol.control]
+    return figures.residual_figure(hold, time_s, measured, band, title, colour, unit=unit)
 
 
 def _replicates(stored: Stored) -> Array:
