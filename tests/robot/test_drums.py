@@ -118,6 +118,27 @@ def test_a_session_may_give_motor_angles(tmp_path):
         session_file.read_session(tmp_path / "b", schema.read_robot_file("cogiro-desk"), 0.02, 1e-3)
 
 
+def test_motor_angles_in_degrees_are_refused_with_their_unit(tmp_path):
+    robot = _with_drums("cogiro-desk")
+    angle = np.degrees(drums.motor_angle(robot.drums, np.full(8, 1.5)))
+    path = tmp_path / "session.csv"
+    names = [f"motor_{leg}_rad" for leg in range(1, 9)]
+    header = ",".join(["hold", "duration_s", *names])
+    path.write_text(f"{header}\n1,60,{','.join(map(str, angle))}\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"motor_1_rad.* pays out .*; the motor's angle is in radians"):
+        session_file.read_session(path, robot, 0.02, 1e-3)
+
+
+def test_a_hold_that_one_sensor_did_not_read_is_refused_with_the_rule(tmp_path):
+    robot = schema.read_robot_file("cogiro-desk")
+    path = tmp_path / "session.csv"
+    header = ",".join(session_header(robot, []))
+    cells = [1, *robot.home_m, 0, 0, 0, 60, *[1.5] * 8, "", *[2.0] * 7]
+    path.write_text(f"{header}\n{','.join(map(str, cells))}\n", encoding="utf-8")
+    with pytest.raises(InputError, match="line 2: .* all or none: a hold is read by all sensors or by none"):
+        session_file.read_session(path, robot, 0.02, 1e-3)
+
+
 def test_tables_may_give_the_straight_lengths_that_firmware_counts():
     """Millimetres from anchor to platform, of wires of several lines with more beyond the anchor."""
     robot = schema.read_robot_file("hangprinter-4")

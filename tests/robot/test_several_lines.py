@@ -247,3 +247,11 @@ def test_sag_is_that_of_a_level_cable():
     assert (
         sag.sag_warnings(replace(robot, mass_kg_m=None), np.array([4.0, 0.0, 1.0]), np.eye(3), np.full(6, 20.0)) == []
     )
+
+
+def test_the_next_command_names_every_posterior(fitted, tmp_path, capsys):  # noqa: F811
+    robot, out = _file(tmp_path), tmp_path / "out"
+    both = [f"default={fitted}", f"thick={fitted}"]
+    wires = ["--wires", both[0], "--wires", both[1]]
+    assert main(["pose", str(robot), *wires, "--draws", "5", "--times", "0,60", "--output", str(out)]) == 0
+    assert f"READINGS.csv {' '.join(wires)}  (when" in capsys.readouterr().out

@@ -9,12 +9,12 @@ from wirebayes.cli.options import AsJson, ExperimentName, Output, OwnEffects, Qu
 
 RobotFile = Annotated[str, typer.Argument(metavar="ROBOT.toml", help="A robot's file, or the name of a shipped robot.")]
 Wires = Annotated[
-    list[str],
+    list[str] | None,
     typer.Option(
         "--wires",
         metavar="FOLDER",
         help="A folder with a posterior.nc, or several of one line with commas between; NAME=FOLDER for each of "
-        "several wires.",
+        "several wires. None where the robot's file gives the parameters of all.",
     ),
 ]
 Draws = Annotated[int, typer.Option("--draws", min=1, help="Posterior draws used, evenly thinned.")]
@@ -75,7 +75,7 @@ MostDraws = Annotated[
 
 def pose_command(
     robot: RobotFile,
-    wires: Wires,
+    wires: Wires = None,
     output: Output = None,
     position: Position = None,
     rotation: Rotation = None,
@@ -116,7 +116,7 @@ def pose_command(
     with progress() as report:
         found = run(
             robot,
-            named_lines(wires),
+            named_lines(wires or []),
             position=position,
             rotation=rotation,
             times=times,
@@ -141,13 +141,13 @@ def pose_command(
             output=folder_for("pose", robot, output),
             progress=report,
         )
-    conclude(found, Given(typed(robot), typed(wires[0])), as_json=as_json, quiet=quiet)
+    conclude(found, Given(typed(robot), _typed_options(wires or [])), as_json=as_json, quiet=quiet)
 
 
 def calibrate_command(
     robot: RobotFile,
     readings: Annotated[Path, typer.Argument(metavar="READINGS.csv", help="Poses, joints and tensions, in order.")],
-    wires: Wires,
+    wires: Wires = None,
     output: Output = None,
     tension_sd: TensionError = 0.02,
     tilt_sd: Annotated[
@@ -206,7 +206,7 @@ def calibrate_command(
         found = run(
             robot,
             readings,
-            named_lines(wires),
+            named_lines(wires or []),
             tension_sd=tension_sd,
             tilt_sd=tilt_sd,
             reference_sd=reference_sd,
@@ -225,12 +225,12 @@ def calibrate_command(
             output=folder_for("calibrate", robot, output),
             progress=report,
         )
-    conclude(found, Given(typed(robot), typed(wires[0])), as_json=as_json, quiet=quiet)
+    conclude(found, Given(typed(robot), _typed_options(wires or [])), as_json=as_json, quiet=quiet)
 
 
 def export_command(
     robot: RobotFile,
-    wires: Wires,
+    wires: Wires = None,
     output: Output = None,
     tensions: Annotated[
         str, typer.Option(metavar="N,N,…", help="Tensions of the creep table, in newtons.")
@@ -251,7 +251,7 @@ def export_command(
 
     exported = run(
         robot,
-        named_lines(wires),
+        named_lines(wires or []),
         tensions=tensions,
         times=times,
         draws=draws,
@@ -260,4 +260,11 @@ def export_command(
         seed=seed,
         output=folder_for("export", robot, output),
     )
-    print_answer(exported, Given(typed(robot), typed(wires[0])))
+    print_answer(exported, Given(typed(robot), _typed_options(wires or [])))
+
+
+def _typed_options(wires: list[str]) -> str:
+    """``--wires`` as it was given."""
+    from wirebayes.views.result import typed
+
+    return "".join(f" --wires {typed(one)}" for one in wires)

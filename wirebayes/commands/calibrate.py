@@ -49,7 +49,7 @@ UNKNOWNS = "unknowns.json"  # the posterior that a history can start from
 def calibrate(
     robot: RobotLike,
     readings: Any,
-    wires: Wires,
+    wires: Wires | None = None,
     *,
     tension_sd: float = 0.02,
     tilt_sd: float = 1e-3,
@@ -82,6 +82,7 @@ def calibrate(
         A row per hold, in order: pose or NaN, duration, joint values or motor angles, and tensions at its end or
         NaN.
     wires : Posterior, Findings, or path of a folder with a ``posterior.nc``; or a mapping of wire name to one of them
+        May be left out where the robot's file gives the parameters of all wires.
     tension_sd : float
         Standard error of a tension, N.
     tilt_sd : float
@@ -141,9 +142,7 @@ def calibrate(
     given.check()
     if not 0 <= next_poses <= _MOST_VISITS:
         raise InputError(f"--next-poses: found {next_poses}, expected a number from 0 to {_MOST_VISITS}")
-    machine = robot_of(robot)
-    if machine.freedom == "orientation":
-        raise InputError(f"{machine.name}: found a platform on a ball joint, expected one that calibrate knows")
+    machine = _known_robot(robot)
     bias = _tension_bias(machine, tension_bias)
     session, values, read = _session(readings, machine, given, bias)
     line = draws_for(machine, wires, draws, experiment, own)
@@ -168,6 +167,14 @@ def calibrate(
             _write(run.directory, calibrated, found, known, _belongs_to(calibrated, wires, experiment))
             run.finish()
     return Calibration(place, own, computed=run.state != "done")
+
+
+def _known_robot(robot: RobotLike) -> Robot:
+    """A robot whose platform is one that can be calibrated."""
+    machine = robot_of(robot)
+    if machine.freedom == "orientation":
+        raise InputError(f"{machine.name}: found a platform on a ball joint, expected one that calibrate knows")
+    return machine
 
 
 @dataclass(frozen=True)
@@ -311,7 +318,7 @@ def _write_robot(path: Path, given: RobotLike, calibrated: Robot) -> Robot:
 
 
 def calibrated_of(
-    calibration: PathLike | Calibration, robot: Robot, line: WireDraws, wires: Wires, experiment: str | None
+    calibration: PathLike | Calibration, robot: Robot, line: WireDraws, wires: Wires | None, experiment: str | None
 ) -> Calibrated:
     """What a calibration left known, for a robot and a line that must be those it was done with.
 
@@ -373,7 +380,7 @@ def _check_usable(folder: Path, name: str) -> None:
         )
 
 
-def _belongs_to(robot: Robot, wires: Wires, experiment: str | None) -> BelongsTo:
+def _belongs_to(robot: Robot, wires: Wires | None, experiment: str | None) -> BelongsTo:
     """What tells a robot and the posterior of its wires from others."""
     posterior = posterior_of(wires, experiment)
     kept = posterior if isinstance(posterior, str) else content_hash(posterior)

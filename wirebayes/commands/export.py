@@ -25,7 +25,7 @@ TIMES_S = (60.0, 600.0, 3600.0, 86400.0)
 
 def export(
     robot: RobotLike,
-    wires: Wires,
+    wires: Wires | None = None,
     *,
     tensions: Numbers = TENSIONS_N,
     times: Numbers = TIMES_S,
@@ -41,6 +41,7 @@ def export(
     ----------
     robot : Robot, name of a shipped robot, or path
     wires : Posterior, Findings, or path of a folder with a ``posterior.nc``; or a mapping of wire name to one of them
+        May be left out where the robot's file gives the parameters of all wires.
     tensions : sequence of float
         Tensions of the creep table, N.
     times : sequence of float

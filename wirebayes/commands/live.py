@@ -11,7 +11,7 @@ from wirebayes.views.calibration import Calibration
 
 def live(
     robot: RobotLike,
-    wires: Wires,
+    wires: Wires | None = None,
     *,
     position: Numbers | None = None,
     rotation: Numbers | None = None,
@@ -32,6 +32,7 @@ def live(
     ----------
     robot : Robot, name of a shipped robot, or path
     wires : Posterior, Findings, or path of a folder with a ``posterior.nc``; or a mapping of wire name to one of them
+        May be left out where the robot's file gives the parameters of all wires.
     position, rotation : (3,) arrays, optional
         About where the platform is at the first step, m, and its rotation vector, rad; the home pose when left out.
     reads : bool

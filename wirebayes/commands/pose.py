@@ -58,7 +58,7 @@ DRAWS, OVER_TIME = 1000, 200  # of the posterior; over time each is followed thr
 
 def pose(
     robot: RobotLike,
-    wires: Wires,
+    wires: Wires | None = None,
     *,
     position: Numbers | None = None,
     rotation: Numbers | None = None,
@@ -93,6 +93,7 @@ def pose(
     ----------
     robot : Robot, name of a shipped robot, or path
     wires : Posterior, Findings, or path of a folder with a ``posterior.nc``; or a mapping of wire name to one of them
+        May be left out where the robot's file gives the parameters of all wires.
         The line that the wires are cut from; of findings the final model. A list of several: tests of one line, from
         which the spread of its specimens is estimated.
     position : (3,) array, optional
@@ -219,7 +220,7 @@ class _Given:
     """What a single pose and poses over time are given alike."""
 
     robot: RobotLike
-    wires: Wires
+    wires: Wires | None
     draws: int
     experiment: str | None
     own_effects: Path | None
@@ -227,7 +228,7 @@ class _Given:
     output: PathLike | None
     progress: Progress
 
-    def draws_of(self, wires: Wires, machine: Robot) -> WireDraws:
+    def draws_of(self, wires: Wires | None, machine: Robot) -> WireDraws:
         """Draws of the posterior of some wires, for the robot with its payload."""
         return draws_for(machine, wires, self.draws, self.experiment, self.own_effects)
 

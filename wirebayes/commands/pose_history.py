@@ -66,7 +66,7 @@ def calibrated_errors(
     calibration: PathLike | Calibration | None,
     robot: Robot,
     line: WireDraws,
-    wires: Wires,
+    wires: Wires | None,
     experiment: str | None,
 ) -> Uncertain:
     """The same standard errors, with what a calibration left known in the place of reference error and spread.

@@ -18,7 +18,7 @@ from wirebayes.errors import InputError
 from wirebayes.json_files.plain import plain
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.draws import WireDraws, lines_of
+from wirebayes.robot.mechanics.draws import WireDraws, lines_of, stated_line
 from wirebayes.robot.motion.hanging import at_home
 from wirebayes.strict.files import PathLike
 from wirebayes.views.findings import Findings
@@ -61,8 +61,10 @@ def robot_of(robot: RobotLike) -> Robot:
     return at_home(robot if isinstance(robot, Robot) else read_robot(robot))
 
 
-def posterior_of(wires: Wires, experiment: str | None = None) -> Path | str:
-    """The posterior that decides a result; of several lines, what tells them all."""
+def posterior_of(wires: Wires | None, experiment: str | None = None) -> Path | str:
+    """The posterior that decides a result; of several lines, what tells them all; empty where there is none."""
+    if wires is None:
+        return ""
     if _several(wires):
         return hash_of({name: str(_content_of(line, experiment)) for name, line in wires.items()})
     if _is_sample(wires):
@@ -149,15 +151,15 @@ def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effect
 
 
 def draws_for(
-    robot: Robot, wires: Wires, count: int, experiment: str | None = None, own_effects: Path | None = None
+    robot: Robot, wires: Wires | None, count: int, experiment: str | None = None, own_effects: Path | None = None
 ) -> WireDraws:
     """`draws_of` for a robot, whose legs must fit the lines.
 
     Parameters
     ----------
     robot : Robot
-    wires : path, Posterior, Posteriors or Findings
-        As for `draws_of`.
+    wires : path, Posterior, Posteriors, Findings or None
+        As for `draws_of`; None where the robot's file gives the parameters of all wires.
     count : int
         Largest number of draws.
     experiment : str, optional
@@ -170,7 +172,7 @@ def draws_for(
     InputError
         If there is no posterior, or the lines and the robot's legs do not fit together.
     """
-    line = draws_of(wires, count, experiment, own_effects)
+    line = stated_line(robot, count) if wires is None else draws_of(wires, count, experiment, own_effects)
     lines_of(robot, line)
     idle = [name for name in line.each if name not in robot.wire]
     if line.others and idle:
@@ -206,8 +208,10 @@ def _check_alike(name: str, first: WireDraws, other: str, line: WireDraws) -> No
             raise InputError(f"--wires: found {found}, expected one for all wires")
 
 
-def named_lines(texts: Sequence[str]) -> Wires:
+def named_lines(texts: Sequence[str]) -> Wires | None:
     """What ``--wires`` was given: a line, or several times ``NAME=LINE``; a line is a folder, or some with commas."""
+    if not texts:
+        return None
     pairs = [text.partition("=") for text in texts]
     if len(texts) == 1 and (not pairs[0][1] or Path(texts[0]).exists()):
         return _folders(texts[0])

@@ -18,7 +18,7 @@ class WiresUsed(TypedDict):
     """Which posterior the answer is for; `legs` has the line of each wire."""
 
     draws: int
-    tested_length_mm: float
+    tested_length_mm: float | None  # of a line that was tested
     elastic_law: str
     history: str
     effects: list[str]

@@ -52,6 +52,8 @@ def panel(xlabel: str, ylabel: str, title: str = "", size: tuple[float, float] =
         axes.set_title(title, fontsize=10.5, loc="left", color=INK, y=1.0)
     without_frame(axes)
     axes.tick_params(labelsize=9)
+    power = axes.yaxis.get_offset_text()  # of ten, away from the title
+    power.set(x=1.0, horizontalalignment="right")
     return figure, axes
 
 

@@ -87,7 +87,7 @@
         const up = y < heart[1] || scene.exits.every(e => Math.abs(at(e)[1] - heart[1]) < 1);
         const side = x < heart[0] - 20 ? "start" : x > heart[0] + 20 ? "end" : "middle";
         const alike = scene.exits.slice(0, w).filter(e => Math.hypot(at(e)[0] - x, at(e)[1] - y) < 26).length;
-        const pulled = pull ? pull[w] > 0 ? `: ${pull[w].toPrecision(3)} N` : ": slack" : "";
+        const pulled = pull ? pull[w] > 0 ? `: ${Number(pull[w].toPrecision(3))} N` : ": slack" : "";
         const move = {start: -8, end: 8, middle: 0}[side];
         svg.append(make("text", {x: x + move, y: y + (up ? -9 - 13 * alike : 18 + 13 * alike), "text-anchor": side, class: "wire"}, `${w + 1}${pulled}`));
       });

@@ -29,7 +29,7 @@ class Calibration(Result[CalibrateJson]):
             again = "with more poses, or once readings, stated errors and --anchor-sd are checked"
             return f"wirebayes calibrate {given.file} {again}"
         if robot.is_file():
-            settings = f"wirebayes export {typed(robot)} --wires {given.wires}  (for controllers and simulators)"
+            settings = f"wirebayes export {typed(robot)}{given.wires}  (for controllers and simulators)"
             return f"{settings}, with the references of {lengths}"
         return f"set the lengths of {lengths} in the controller"
 

@@ -86,10 +86,10 @@ def _after_pose(found: PoseJson | PoseHistoryJson, folder: Path, given: Given) -
     nearest = cast(PoseJson, found).get("nearest_position_m")
     if nearest is not None:
         near = coordinates(nearest, 5).replace(" ", "")
-        return f"wirebayes pose {given.file} --wires {given.wires} --position={near}, where the platform hangs"
+        return f"wirebayes pose {given.file}{given.wires} --position={near}, where the platform hangs"
     if lost or not found.get("feasible", True):
         return "another pose or payload, or other bounds of the tension in the robot's file"
-    calibrate = f"wirebayes calibrate {given.file} READINGS.csv --wires {given.wires}"
+    calibrate = f"wirebayes calibrate {given.file} READINGS.csv{given.wires}"
     return f"{calibrate}  (when it drifts too far)"
 
 

@@ -30,11 +30,11 @@ class Given:
     file : str
         The experiment file, or the robot, as `typed`.
     wires : str
-        Folder of the wires' posterior, as `typed`.
+        The options that say which wires, as they are typed.
     """
 
     file: str = "FILE.toml"
-    wires: str = "DIR"
+    wires: str = " --wires DIR"
 
 
 NOTHING = Given()

@@ -111,6 +111,26 @@ def given(wire: GivenWire) -> WireDraws:
     return WireDraws({k: np.array([v]) for k, v in wire.parameters.items()}, wire.length_mm)
 
 
+def stated_line(robot: Robot, count: int) -> WireDraws:
+    """As many draws as asked for of a line that no leg hangs on: a robot's file gives the parameters of all wires.
+
+    Parameters
+    ----------
+    robot : Robot
+    count : int
+
+    Raises
+    ------
+    InputError
+        A leg's wire has no parameters in the robot's file.
+    """
+    for leg, name in enumerate(robot.wire, start=1):
+        if name not in robot.given:
+            found = "no --wires, and a wire whose parameters the file does not give"
+            raise InputError(f"{robot.name}, leg {leg}: found {found}, expected --wires FOLDER or [wires.NAME] k1_N")
+    return WireDraws({name: np.ones(count) for name in CORE}, 1e3, name="")
+
+
 def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random.Generator | None = None) -> Wires:
     """Wires of all legs: one joint draw for all legs of one line, and a spread from specimen to specimen.
 

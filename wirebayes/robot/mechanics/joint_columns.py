@@ -91,5 +91,18 @@ def meant(name: str, joint_m: float) -> str:
     return f", which is {short(joint_m, 4)} m of wire" if name.startswith(_STRAIGHT) else ""
 
 
+def joint_unit_told(name: str) -> str:
+    """What to add to what is expected of a cell, where its unit is not that of joint values.
+
+    Parameters
+    ----------
+    name : str
+        Of its column.
+    """
+    if name.startswith(_MOTOR):
+        return "; the motor's angle is in radians, from nothing paid out"
+    return "; straight lengths are in millimetres" if name.startswith(_STRAIGHT) else ""
+
+
 def _has(header: Sequence[str], prefix: str) -> bool:
     return any(str(name).startswith(prefix) for name in header)

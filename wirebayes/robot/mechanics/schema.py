@@ -19,6 +19,8 @@ from wirebayes.strict.files import read_text
 from wirebayes.strict.toml_keys import LARGEST_NUMBER, Keys
 
 _GIVEN = {"k1_N": "k1", "B_mm": "B", "U": "U", "k2": "k2", "N": "N"}
+_NO_CREEP = {"B": 0.0, "U": 1.0, "k2": 1.0, "N": 1.0}  # no share of any tension; how it would go on is all the same
+_ANY_LENGTH_MM = 1000.0  # what no elongation refers to
 
 
 def read_robot_file(name_or_file: str | Path) -> Robot:
@@ -247,10 +249,18 @@ def _wires(top: Keys) -> tuple[dict[str, GivenWire], set[str], dict[str, float]]
         wire = tables.inside(name)
         masses[name] = wire.number("mass_kg_m", default=0.0, least=0)
         if not _is_fitted(wire, name):
-            values = {short: wire.number(key, above=0) for key, short in _GIVEN.items()}
-            given[name] = GivenWire(values, wire.number("length_mm", above=0))
+            given[name] = _given_wire(wire)
         wire.finish()
     return given, set(tables.table), masses
+
+
+def _given_wire(wire: Keys) -> GivenWire:
+    """A wire of stated parameters; one of a stiffness alone does not creep."""
+    of_creep = [key for key in (*_GIVEN, "length_mm") if key != "k1_N"]
+    if not any(key in wire.table for key in of_creep):
+        return GivenWire({"k1": wire.number("k1_N", above=0), **_NO_CREEP}, _ANY_LENGTH_MM)
+    values = {name: wire.number(key, above=0) for key, name in _GIVEN.items()}
+    return GivenWire(values, wire.number("length_mm", above=0))
 
 
 def _is_fitted(wire: Keys, name: str) -> bool:

@@ -13,13 +13,13 @@ def wires_summary(robot: Robot, line: WireDraws) -> WiresUsed:
     kept = line.material()
     used: WiresUsed = {
         "draws": line.count,
-        "tested_length_mm": line.length_mm,
+        "tested_length_mm": line.length_mm if line.name else None,
         "elastic_law": line.law,
         "history": line.history,
         "effects": [e.key for e in kept],
         "left_out": [e.key for e in line.effects if e not in kept],
         "legs": list(robot.wire),
-        "lines": list(line.each),
+        "lines": [name for name in line.each if name],
     }
     several = {name: _specimens(one) for name, one in line.each.items() if one.spread}
     if several:

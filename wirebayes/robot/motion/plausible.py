@@ -17,7 +17,7 @@ from wirebayes.result_warnings import Notice
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.draws import WireDraws, lines_of
-from wirebayes.robot.mechanics.joint_columns import column_of_leg, meant
+from wirebayes.robot.mechanics.joint_columns import column_of_leg, joint_unit_told, meant
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
@@ -90,7 +90,7 @@ def refuse(robot: Robot, joint_m: Floats, table: CsvTable, columns: Sequence[str
     (row, leg), expected = unlikely
     column = column_of_leg(robot, columns, leg)
     found = shown(table.cell(row, column)) + meant(column, joint_m[row, leg])
-    raise table.complain(row, column, found, expected)
+    raise table.complain(row, column, found, expected + joint_unit_told(column))
 
 
 def refuse_far(robot: Robot, position_m: Floats, table: CsvTable, columns: Sequence[str]) -> None:

@@ -113,7 +113,9 @@ def parse_session(
     tension, normal = some(tensions), some(NORMAL if tilted else ())
     position, turn = some(POSITION), some(TURN)
     plausible.refuse_far(robot, position, table, POSITION)
-    _refuse_half(table, np.concatenate([tension, normal], axis=1), "the readings")
+    _refuse_half(
+        table, np.concatenate([tension, normal], axis=1), "the readings", ": a hold is read by all sensors or by none"
+    )
     _refuse_half(table, position, "the position")
     _refuse_half(table, turn, "the rotation")
     was_read = np.asarray(np.isfinite(tension).all(1))
@@ -163,13 +165,14 @@ def _refuse_twice(table: CsvTable, number: Floats) -> None:
             raise table.complain(row, "hold", f"{value:g} once more", "a row for each hold")
 
 
-def _refuse_half(table: CsvTable, cells: Floats, name: str) -> None:
+def _refuse_half(table: CsvTable, cells: Floats, name: str, why: str = "") -> None:
     """Refuse rows with some of several cells empty."""
     given = np.isfinite(cells)
     half = given.any(1) & ~given.all(1)
     if half.any():
         line = table.place(int(np.argmax(half)), "hold").partition(", column")[0]
-        raise InputError(f"{table.path}, {line}: found some cells of {name} empty, expected all or none")
+        found = f"found some cells of {name} empty, expected all or none"
+        raise InputError(f"{table.path}, {line}: {found}{why}")
 
 
 def may_be_empty(name: str) -> bool:
