@@ -211,7 +211,8 @@ class Extrapolation:
             return "more than a twentieth of the draws do not creep at this tension"
         if self.pareto_k > TRUSTED_K:
             return "these draws cannot show how much it depends on the prior"
-        wider = f"with half the prior's weight the band is {100 * share:.0f} % wider"
+        how = "wider" if share >= 0.0 else "narrower"
+        wider = f"with half the prior's weight the band is {100.0 * abs(share):.0f} % {how}"
         depends = "it depends on the prior" if share > 0.1 else "it hardly depends on the prior"
         return f"{depends}: {wider}"
 
