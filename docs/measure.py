@@ -42,7 +42,7 @@ STUDIES = {
         "null.json",
     ),
     "hidden_any_scale": (
-        "-m analyses.discovery.hidden_any_scale --tests 29 --rows {folder} --output {folder}/hidden.json",
+        "-m analyses.discovery.hidden_any_scale --tests 30 --rows {folder} --output {folder}/hidden.json",
         "hidden.json",
     ),
     "calibration": ("-m analyses.calibration --output {folder}", "calibration.json"),
