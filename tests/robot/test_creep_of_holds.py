@@ -11,6 +11,7 @@ from tests.robot.test_usable import _session
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.motion.creeping_hold import CreepingHold
+from wirebayes.robot.self_calibration import whole
 from wirebayes.robot.self_calibration.descent import Descent
 from wirebayes.robot.self_calibration.equations import Holds, Noise, State
 from wirebayes.robot.self_calibration.holds_creep import creep_of
@@ -19,6 +20,7 @@ from wirebayes.robot.self_calibration.posterior import gaussian_posterior
 from wirebayes.robot.self_calibration.predicted import predict_session
 from wirebayes.robot.self_calibration.session import LengthPrior
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
+from wirebayes.robot.self_calibration.whole_answer import holds_of
 
 # Steps of a third of a hold's thousandfold were off by 17, .9, .5, .2 and .75 standard deviations of a reading here.
 STRONG = [("planar-4", 0), ("body-7", 0), ("body-7", 1), ("body-8", 0), ("point-4", 1)]
@@ -118,3 +120,42 @@ def test_the_true_state_closes_its_loops(seed):
     pull_N = _latent(robot, session, pose, tension, real.read_length_m[0], stiff)
     left = _loops(robot, prior, Holds(session, pull_N), values, pose)
     assert np.sqrt(np.mean(left[pull_N > 0] ** 2)) < 1.5e-7 * robot.span_m  # a slack wire has a gap
+
+
+def _read_exactly(kind, seed):
+    """A drawn session, read with errors, its unknowns and its holds where nobody knows the poses."""
+    robot, prior, session, values = _drawn(kind, seed)
+    readings = predict_session(robot, prior, session, values).readings[0]
+    readings += np.random.default_rng(seed).standard_normal(len(readings))
+    unknowns = Unknowns(robot, prior, StatedErrors(joint_m=0.0))
+    return session, readings, unknowns, holds_of(robot, session.without_poses(), readings)
+
+
+def _by_differences(unknowns, session, readings, white):
+    """What a session's own prediction says at a point: the slopes of its readings, and how far they are off."""
+    mean, root = unknowns.moments
+    step = 1e-3
+    points = white + step * np.vstack([np.zeros_like(white), np.eye(len(white)), -np.eye(len(white))])
+    read = predict_session(unknowns.robot, unknowns.prior, session, mean + points @ root.T).readings
+    up, down = np.split(read[1:], 2)
+    return (up - down).T / (2 * step), readings - read[0]
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("planar-4", 1), ("point-5", 0), ("body-7", 0), ("body-8", 1)], ids=str)
+def test_where_joint_values_are_exact_the_posterior_is_that_of_the_predicted_readings(kind, seed):
+    """Creep of a hold follows its own tension and those before it, each by itself.
+
+    With all of them in one slope, standard deviations of lengths were up to a fifth too large and the mode off by a
+    third of one.
+    """
+    session, readings, unknowns, holds = _read_exactly(kind, seed)
+    first = State(np.zeros(unknowns.count), session.position_m, session.rotation, holds.tension_N)
+    found = whole.estimate(unknowns, holds, first)
+    assert found.converged
+    white = found.state.white
+    slopes, off = _by_differences(unknowns, session, readings, white)
+    covariance = np.linalg.inv(slopes.T @ slopes + np.eye(len(white)))
+    ratio = np.sqrt(np.diag(found.covariance) / np.diag(covariance))
+    np.testing.assert_allclose(ratio, 1.0, atol=0.02)
+    to_mode = covariance @ (slopes.T @ off - white)
+    np.testing.assert_allclose(to_mode / np.sqrt(np.diag(covariance)), 0.0, atol=2 * whole._STILL)

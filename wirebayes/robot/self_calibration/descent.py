@@ -11,6 +11,7 @@ from wirebayes.numeric.rows import Record, chosen_rows
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.self_calibration.earlier_tensions import followed
 from wirebayes.robot.self_calibration.equations import Equations, Holds, Noise, State
 from wirebayes.robot.self_calibration.linearisation import linearised
 from wirebayes.robot.self_calibration.strain import Grown
@@ -95,13 +96,13 @@ def descend(
         At most.
     """
     target = _Target(unknowns, holds, noise, creep, since)
-    here = target.at(state)
+    here = target.at(state).followed()
     damping = 1e-6
     for _ in range(steps):
         there = target.ahead(here, damping)
         if there.cost < here.cost:
             gain = here.cost - there.cost
-            here = there
+            here = there.followed()
             damping = max(damping / 10, 1e-12)
             if gain < _GAIN:
                 return here.ended(True)
@@ -119,6 +120,10 @@ class _Place:
     state: State
     equations: Equations
     cost: float
+
+    def followed(self) -> "_Place":
+        """The same, with slopes that a step can be taken by."""
+        return replace(self, equations=followed(self.equations))
 
     def ended(self, converged: bool) -> Descent:
         return Descent(self.state, self.equations, self.cost, converged)

@@ -96,6 +96,8 @@ class Equations:
         Which of the k are ``loop``, ``balance``, ``tension``, ``pose`` and ``tilt``.
     known : (p, k) bool array
         False where nothing was stated or read; of tensions, residuals there are those from what is usual.
+    by_earlier : (p, p, w, w) array, optional
+        Slopes of each hold's loops by the tensions of each hold before it, through creep; None where nothing creeps.
     """
 
     residual: Floats
@@ -103,6 +105,7 @@ class Equations:
     by_hold: Floats
     rows: dict[str, slice]
     known: Bools
+    by_earlier: Floats | None = None
 
 
 def pulled(latent_N: Floats, soft_N: float) -> tuple[Floats, Floats]:

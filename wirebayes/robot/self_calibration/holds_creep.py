@@ -19,7 +19,14 @@ _FINE, _ROUGH = 32, 8  # times in a hold at most: of a state that has come to re
 _BALANCED = 0.1  # of the largest tension: a state whose equilibrium pulls otherwise is still rough
 
 
-def creep_of(unknowns: Unknowns, holds: Holds, state: State, known: Grown | None = None, roughly: float = 1.0) -> Grown:
+def creep_of(
+    unknowns: Unknowns,
+    holds: Holds,
+    state: State,
+    known: Grown | None = None,
+    roughly: float = 1.0,
+    each: bool = False,
+) -> Grown:
     """Creep under the tensions of a state.
 
     Parameters
@@ -31,6 +38,8 @@ def creep_of(unknowns: Unknowns, holds: Holds, state: State, known: Grown | None
         Creep of a state near by: the search for tensions within the holds begins from its own.
     roughly : float
         Times the error that is usual: a state that will move on needs no better.
+    each : bool
+        As for `strain.grown`.
     """
     here = _Here(unknowns, holds, state)
     resolved = roughly * _resolution(unknowns, holds, here)
@@ -40,7 +49,7 @@ def creep_of(unknowns: Unknowns, holds: Holds, state: State, known: Grown | None
     def loaded(end_N: Floats) -> Loaded:
         return Loaded(end_N, here.response, holds.session.duration_s, resolved, finest, here.beyond)
 
-    return grown(unknowns, state.white, state.pull_N, loaded, course)
+    return grown(unknowns, state.white, state.pull_N, loaded, course, each)
 
 
 def _resolution(unknowns: Unknowns, holds: Holds, here: "_Here") -> float:

@@ -1,6 +1,6 @@
 """The equations of a session's holds about a state: residuals in standard deviations, and their slopes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -65,13 +65,14 @@ def linearised(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, cre
     """
     about = _About.at(unknowns, holds, noise, state)
     out = _empty(unknowns, holds)
-    _loops(out, about, creep, since)
+    lengths = _Lengths.at(about, creep, since)
+    _loops(out, about, creep, lengths)
     _balance(out, about)
     _tensions(out, about)
     _poses(out, about)
     if holds.tilt is not None:
         _tilts(out, about)
-    return out
+    return replace(out, by_earlier=_by_earlier(about, creep, lengths))
 
 
 def _empty(unknowns: Unknowns, holds: Holds) -> Equations:
@@ -125,7 +126,13 @@ class _Lengths:
     def by_pull(self, creep: Grown) -> Floats:
         """(p, w) slopes of `longer` by the tensions."""
         elastic = self.elastic
-        return creep.by_pull * elastic.ratio + (1 + self.strain) * elastic.by_pull
+        by_own = np.einsum("hhw->hw", creep.by_pull)
+        return by_own * elastic.ratio + (1 + self.strain) * elastic.by_pull
+
+    def by_earlier(self, creep: Grown) -> Floats:
+        """(p, p, w) slopes of `longer` by the tensions of earlier holds."""
+        before = np.tri(len(self.bare), k=-1)[..., None] * creep.by_pull
+        return before * self.elastic.ratio[:, None]
 
     def by_wires(self, creep: Grown) -> Floats:
         """(p, w, d) slopes of `longer` by the wires' unknowns."""
@@ -138,15 +145,26 @@ def _more_creep(about: _About, creep: Grown, since: State) -> Floats:
     """(p, w) creep strain, to first order, that a state has beyond the one since which creep was not simulated."""
     state, wires = about.state, about.unknowns.slices["wires"]
     change = state.white[wires] - since.white[wires]
-    return creep.by_wires @ change + creep.by_pull * (state.pull_N - since.pull_N)
+    by_tension = np.einsum("hkw,kw->hw", creep.by_pull, state.pull_N - since.pull_N)
+    return creep.by_wires @ change + by_tension
 
 
-def _loops(out: Equations, about: _About, creep: Grown, since: State) -> None:
+def _by_earlier(about: _About, creep: Grown, lengths: _Lengths) -> Floats | None:
+    """(p, p, w, w) slopes of every hold's loops, as `_weigh_loops` has them, by the tensions of earlier holds."""
+    if not creep.by_pull.any():
+        return None
+    robot = about.here
+    slope = -lengths.bare[:, None] * lengths.by_earlier(creep) / about.noise.joint_m
+    alone = _errors_apart(robot)
+    mixes = np.eye(robot.legs) if alone is None else alone
+    return mixes * slope[:, :, None]
+
+
+def _loops(out: Equations, about: _About, creep: Grown, lengths: _Lengths) -> None:
     """Every wire is as long as its way: stretched from what the joint value, its reference and creep make of it."""
     robot, unknowns = about.here, about.unknowns
     loop, d = out.rows["loop"], robot.degrees
     leg = np.arange(robot.legs)
-    lengths = _Lengths.at(about, creep, since)
     way = statics.stretched(robot, about.shape, lengths.offset.T).T
     out.residual[:, loop] = way - lengths.bare * lengths.longer
     out.by_hold[:, loop, :d] = about.J

@@ -150,8 +150,7 @@ def _at(found: Whole, holds: Holds, poses: _Candidates) -> Equations:
 
 def _no_creep(found: Whole, count: int) -> Grown:
     legs, wires = found.unknowns.robot.legs, len(found.unknowns.moments[0])
-    zero = np.zeros((count, legs))
-    return Grown(zero, np.zeros((count, legs, wires)), zero)
+    return Grown(np.zeros((count, legs)), np.zeros((count, legs, wires)), np.zeros((count, count, legs)))
 
 
 def _information(e: Equations) -> Floats:

@@ -13,7 +13,7 @@ from scipy.special import chdtrc
 from wirebayes.json_files.calibrate import SensorsAtFault
 from wirebayes.numeric.linear_algebra import inv, solve
 from wirebayes.numeric.typing import Floats
-from wirebayes.progress import ShareDone
+from wirebayes.progress import ShareDone, shares_of
 from wirebayes.result_warnings import Notice
 from wirebayes.robot.self_calibration.equations import Holds
 from wirebayes.robot.self_calibration.posterior import Whole
@@ -114,14 +114,15 @@ def suspects(found: Whole, holds: Holds, progress: ShareDone = lambda share: Non
     white = np.insert(found.state.white, end - legs, np.zeros(legs))
     state = replace(found.state, white=white)
     bias = np.full(legs, np.inf)
-    for _ in range(_TRIES):
-        other = estimate(free, holds, state, progress)
+    for part in shares_of(progress, _TRIES):
+        other = estimate(free, holds, state, part)
         state, before = other.state, bias
         bias = widest * state.white[sensors]
         covariance = widest**2 * other.covariance[sensors, sensors]
         sd = np.sqrt(np.diag(covariance))
         still = np.abs(bias - before) < _STILL * sd
         if other.converged or still.all():
+            progress(1.0)
             return weighed(bias, covariance, widest)
     return None
 

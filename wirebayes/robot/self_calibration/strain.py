@@ -16,7 +16,7 @@ from wirebayes.robot.self_calibration.unknowns import Unknowns
 from wirebayes.robot.self_calibration.within_holds import Loaded, TensionCourse, crept
 
 _STEP = 1e-3  # of a prior's standard deviation: differences of smooth functions
-_LOAD = 1e-2  # relative change of all tensions
+_LOAD = 1e-2  # relative change of a hold's tensions
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,8 @@ class Grown:
     strain : (p, w) array
     by_wires : (p, w, d) array
         By the wires' unknowns in units of their prior.
-    by_pull : (p, w) array
-        By the hold's tension, 1/N.
+    by_pull : (p, p, w) array
+        Of every hold by its own tension and by those of the holds before it, 1/N.
     course : Course, optional
         How tensions came there.
     """
@@ -91,6 +91,7 @@ def grown(
     pull_N: Floats,
     loaded: Callable[[Floats], Loaded],
     known: TensionCourse | None = None,
+    each: bool = False,
 ) -> Grown:
     """Creep of every hold under tensions that ended at known values.
 
@@ -104,26 +105,32 @@ def grown(
         What tensions of n columns that end so were before.
     known : Course, optional
         Of a state near by.
+    each : bool
+        Whether slopes by the tension of every hold are wanted. Else those by all tensions together are taken for
+        slopes by the hold's own.
     """
     wires = differing_wires(unknowns, white)
     columns = _count(wires)
     if not unknowns.prior.creeps:
         strain = np.zeros((*pull_N.shape, columns))
-        none = strain[..., 0]
-        return Grown(none, by_unknown(unknowns, strain), none)
-    # two more columns: all tensions a little larger, and smaller
-    rows = np.concatenate([np.arange(columns), [0, 0]])
-    factor = np.concatenate([np.ones(columns), [1 + _LOAD, 1 - _LOAD]])
+        by_pull = np.zeros((len(pull_N), *pull_N.shape))
+        return Grown(strain[..., 0], by_unknown(unknowns, strain), by_pull)
+    holds = len(pull_N)
+    changes = np.eye(holds) if each else np.ones((holds, 1))  # which holds' tensions every further column changes
+    rows = np.concatenate([np.arange(columns), np.zeros(changes.shape[1], int)])
+    factor = np.ones((holds, 1, len(rows)))
+    factor[:, 0, columns:] += _LOAD * changes
     tensions = np.maximum(pull_N[..., None] * factor, 0.0)
     strain, course = crept(wires.part(rows), loaded(tensions), known)
-    by_wires = by_unknown(unknowns, strain[..., :-2])
-    return Grown(strain[..., 0], by_wires, _by_pull(strain, pull_N), course)
+    by_wires = by_unknown(unknowns, strain[..., :columns])
+    change = strain[..., columns:] - strain[..., :1]
+    by_pull = _by_pull(change if each else change * np.eye(holds)[:, None], pull_N)
+    return Grown(strain[..., 0], by_wires, by_pull, course)
 
 
-def _by_pull(strain: Floats, pull_N: Floats) -> Floats:
-    """Slopes ``(p, w)`` by the tension, of strains whose last two columns have larger and smaller tensions."""
-    change = strain[..., -2] - strain[..., -1]
-    slope = change / (2 * _LOAD * np.maximum(pull_N, 1e-300))
+def _by_pull(change: Floats, pull_N: Floats) -> Floats:
+    """Slopes ``(p, p, w)`` by every hold's tension, of strains' changes ``(p, w, p)`` when one of them is larger."""
+    slope = change.swapaxes(1, 2) / (_LOAD * np.maximum(pull_N, 1e-300))
     return np.where(pull_N > 0, slope, 0.0)
 
 

@@ -97,12 +97,14 @@ def _half(sd: Floats, wider: Floats, degrees: float) -> Floats:
 
 
 def _slope_of_lengths(found: Whole) -> Floats:
-    """The last zero-tension lengths by all unknowns: references, drums and the strain, with all that it depends on."""
-    unknowns, strain = found.unknowns, found.creep.strain[-1]
+    """The last zero-tension lengths by all unknowns: references, drums, and creep with the tensions that it follows."""
+    unknowns, creep = found.unknowns, found.creep
+    strain = creep.strain[-1]
     bare = found.last_m + unknowns.parts(found.state.white).reference_m
     leg = np.arange(len(bare))
-    slope = np.zeros((len(bare), unknowns.count))
-    slope[:, unknowns.slices["wires"]] = bare[:, None] * found.creep.by_wires[-1]
+    tensions = found.by_robot[:, unknowns.robot.degrees :]
+    slope = bare[:, None] * np.einsum("pw,pwm->wm", creep.by_pull[-1], tensions)
+    slope[:, unknowns.slices["wires"]] += bare[:, None] * creep.by_wires[-1]
     slope[leg, unknowns.references.start + leg] += (1 + strain) * unknowns.prior.reference_sd_m
     if unknowns.errors.drum > 0:
         slope[leg, unknowns.drum_columns] = unknowns.errors.drum * found.last_m * ~unknowns.robot.is_linear

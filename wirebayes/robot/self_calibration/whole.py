@@ -10,7 +10,7 @@ import numpy as np
 
 from wirebayes.numeric.means import root_mean_square
 from wirebayes.numeric.typing import Floats
-from wirebayes.progress import Progress, ShareDone
+from wirebayes.progress import Progress, ShareDone, shares_of
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.approach import onward
 from wirebayes.robot.self_calibration.descent import descend
@@ -122,6 +122,8 @@ class _Search:
         How far loops were open after each round.
     came_down : bool
         Whether the last descent ended at a least sum of squares, not for want of steps.
+    each : bool
+        Whether creep follows the tension of every hold by itself (`strain.grown`).
     """
 
     def __init__(self, unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown) -> None:
@@ -129,7 +131,7 @@ class _Search:
         self.noise, self.state, self.creep = noise, state, creep
         self.passed = [state]
         self.roughly, self.cost = ROUGHLY, np.inf
-        self.came_down = False
+        self.came_down = self.each = False
         self.rounds: list[tuple[Floats, Floats]] = []
         self.opened_m: list[float] = []
         self.last_m, _ = inverse.lengths(unknowns.robot, holds.session.joint_m[-1])
@@ -138,7 +140,20 @@ class _Search:
         self.unit_N = holds.session.tension_sd_N if read else noise.pull_N
 
     def at_rest(self, progress: ShareDone) -> Whole:
-        """The posterior where nothing moves on; not converged where the search is given up."""
+        """The posterior where nothing moves on; not converged where the search is given up.
+
+        Slopes by every tension are right about the mode alone, so they come in once nothing moves without them.
+        """
+        roughly, finely = shares_of(progress, 2)
+        found = self._until_still(roughly)
+        if not (found.converged and self.unknowns.prior.creeps):
+            return found
+        self.each = True
+        finer = self._until_still(finely)
+        return finer if finer.converged else found
+
+    def _until_still(self, progress: ShareDone) -> Whole:
+        """The posterior where nothing moves on with one kind of slopes."""
         for taken in range(_ROUNDS):
             progress(taken / _ROUNDS)
             found = self._round()
@@ -158,7 +173,7 @@ class _Search:
     def _round(self) -> Whole:
         """The posterior with creep about the last state, and the noise that its residuals show."""
         since = self.passed[-1]
-        self.creep = creep_of(self.unknowns, self.holds, since, self.creep, self.roughly)
+        self.creep = creep_of(self.unknowns, self.holds, since, self.creep, self.roughly, self.each)
         down = descend(self.unknowns, self.holds, self.noise, self.state, self.creep, since)
         self.state, self.came_down = down.state, down.converged
         found = gaussian_posterior(self.unknowns, down, self.noise, self.creep, self.last_m)
@@ -179,10 +194,10 @@ class _Search:
         self.cost = found.cost
         usual = ROUGHLY * _FINER**taken
         self.roughly = max(_FINEST, min(_STEADY * moved_on, usual))
-        if taken > _WHOLE_ROUNDS:
-            self.passed = onward(self.passed, self.state, sd, self.unit_N)
-        else:
+        if self.each or taken <= _WHOLE_ROUNDS:
             self.passed = [self.state]
+        else:
+            self.passed = onward(self.passed, self.state, sd, self.unit_N)
         self.noise = _next_noise(self.noise, self.rounds)
 
 

@@ -102,7 +102,9 @@ def _from_end(loaded: Loaded, count: int) -> TensionCourse:
 
 
 def _shifted(known: TensionCourse, loaded: Loaded) -> TensionCourse:
-    way = known.path_N - known.path_N[:, -1:]
+    """To other tensions at the end, and as many columns as these have: all go the way of the first."""
+    first = known.path_N[..., :1]
+    way = first - first[:, -1:]
     return TensionCourse(np.maximum(loaded.end_N[:, None] + way, 0.0), known.bend_N)
 
 
