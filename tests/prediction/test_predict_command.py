@@ -21,7 +21,7 @@ from wirebayes.model.build import build
 from wirebayes.model.spec import ModelSpec
 from wirebayes.results.read_back import load_posterior
 from wirebayes.results.store import save_posterior
-from wirebayes.robot.mechanics.draws import wire_warnings
+from wirebayes.robot.mechanics.wire_doubts import wire_warnings
 
 QUICK = Policy(ensembles=2, walkers=64, ess=300.0, r_hat=1.1, most_steps=80)
 TRAINED = 8

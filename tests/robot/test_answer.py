@@ -5,6 +5,7 @@ from tests.robot.lines import STRONGER, line_about
 from wirebayes.json_files.plain import plain
 from wirebayes.report.pictures import robot as pictures
 from wirebayes.robot.mechanics import draws, schema
+from wirebayes.robot.mechanics.wire_doubts import wire_warnings
 from wirebayes.robot.pose.answer import pose_report
 from wirebayes.robot.pose.request import PoseRequest, band_over_draws
 
@@ -93,7 +94,7 @@ def test_what_a_fit_could_not_name_is_said_to_be_missing():
     from wirebayes.effects.unknown import Discrepancy
 
     line = draws.WireDraws(_line(3, 800.0).parameters, 1000.0, effects=(Discrepancy(5, 0.1, 120.0),))
-    message = draws.wire_warnings(schema.read_robot_file("linear-6"), line, np.ones((1, 6)), 1.0, np.ones((1, 6)))
+    message = wire_warnings(schema.read_robot_file("linear-6"), line, np.ones((1, 6)), 1.0, np.ones((1, 6)))
     assert len(message) == 1
     assert "could not name" in message[0].text and message[0].kind == "left-out"
 

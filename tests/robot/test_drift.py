@@ -11,6 +11,7 @@ from wirebayes.commands.wire_draws import wire_draws
 from wirebayes.effects import effect_named
 from wirebayes.effects.rivals import Logarithmic, PowerLaw, TwoModes
 from wirebayes.robot.mechanics import draws, rotation, schema
+from wirebayes.robot.mechanics.wire_doubts import wire_warnings
 from wirebayes.robot.mechanics.wires import Wires, tension
 from wirebayes.robot.motion import creeping_hold, drift, forward, inverse
 from wirebayes.robot.motion.course import Course
@@ -267,11 +268,6 @@ def test_the_tested_range_under_weights_is_that_of_the_weights(tmp_path):
 
 def test_uses_outside_the_tested_range_cause_warnings():
     line = replace(_line(), tension_range_N=(1.0, 5.0), time_range_s=(0.0, 120.0))
-    message = draws.wire_warnings(
-        schema.read_robot_file("linear-6"), line, np.array([0.5, 3.0]), 3600.0, np.array([3.0])
-    )
+    message = wire_warnings(schema.read_robot_file("linear-6"), line, np.array([0.5, 3.0]), 3600.0, np.array([3.0]))
     assert len(message) == 3
-    assert (
-        draws.wire_warnings(schema.read_robot_file("linear-6"), line, np.array([1.5, 3.0]), 100.0, np.array([1.1]))
-        == []
-    )
+    assert wire_warnings(schema.read_robot_file("linear-6"), line, np.array([1.5, 3.0]), 100.0, np.array([1.1])) == []

@@ -10,6 +10,7 @@ from tests.robot.test_history import _standing_still
 from wirebayes.cli import main
 from wirebayes.robot.history.doubts import _dynamics, _unsure_clock
 from wirebayes.robot.mechanics import draws, schema
+from wirebayes.robot.mechanics.wire_doubts import wire_warnings
 from wirebayes.sentences import short
 
 _EXPONENT = re.compile(r"\de\+0\d")
@@ -27,7 +28,7 @@ def test_tensions_and_times_beyond_the_test_are_whole_numbers():
     parameters = {"k1": [6e5], "B": [0.01], "U": [0.9], "k2": [0.03], "N": [0.5]}
     rope = draws.WireDraws({k: np.array(v) for k, v in parameters.items()}, 8000.0)
     rope = replace(rope, tension_range_N=(615.0, 4213.0), time_range_s=(0.0, 43200.0))
-    notices = draws.wire_warnings(robot, rope, np.full((1, 4), 12345.0), 86400.0, np.full((1, 4), 8.0))
+    notices = wire_warnings(robot, rope, np.full((1, 4), 12345.0), 86400.0, np.full((1, 4), 8.0))
     said = "\n".join(notice.text for notice in notices)
     assert "tensions 12300 N leave the tested range 615 to 4210 N" in said
     assert "24 h is longer than the longest tested hold, 12 h" in said

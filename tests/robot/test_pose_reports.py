@@ -504,7 +504,7 @@ def test_what_leaves_the_tests_is_said_of_the_whole_request(monkeypatch: pytest.
         asked.append(joint.tolist())
         return [0]
 
-    monkeypatch.setattr(answer.draws, "wire_warnings", tested)
+    monkeypatch.setattr(answer.wire_doubts, "wire_warnings", tested)
     monkeypatch.setattr(answer.sag, "sag_warnings", sagging)
     monkeypatch.setattr(answer.drums, "emptied", emptied)
     request = PoseRequest(np.zeros(3), np.eye(3), np.array([0.0, 10.0, 90.0]))

@@ -20,6 +20,7 @@ from wirebayes.result_warnings import Notice
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics import draws, sag, schema
 from wirebayes.robot.mechanics.description import GivenWire
+from wirebayes.robot.mechanics.wire_doubts import wire_warnings
 from wirebayes.robot.mechanics.wires import tension
 from wirebayes.robot.motion import drift
 from wirebayes.robot.self_calibration.session import LengthPrior
@@ -96,7 +97,7 @@ def test_the_tested_ranges_are_each_lines_own():
     robot = _mixed(schema.read_robot_file("linear-6"), (1, 4))
     stiff = replace(_line(2), name=THICK, tension_range_N=(0.0, 1.0))
     line = replace(_line(2), others={THICK: stiff}, tension_range_N=(0.0, 9.0))
-    message = draws.wire_warnings(robot, line, np.full((1, 6), 5.0), 60.0, np.ones((1, 6)))
+    message = wire_warnings(robot, line, np.full((1, 6), 5.0), 60.0, np.ones((1, 6)))
     assert message == [Notice("extrapolation", "wire thick: tensions 5 N leave the tested range 0 to 1 N")]
 
 
@@ -104,7 +105,7 @@ def test_the_tested_ranges_are_each_lines_own():
 def test_a_tension_that_vanishes_beside_the_largest_is_none(least, said):
     robot = schema.read_robot_file("linear-6")
     line = replace(_line(2), tension_range_N=(1.0, 9.0))
-    (message,) = draws.wire_warnings(robot, line, np.array([[least, *[15.0] * 5]]), 60.0, np.ones((1, 6)))
+    (message,) = wire_warnings(robot, line, np.array([[least, *[15.0] * 5]]), 60.0, np.ones((1, 6)))
     assert message.text == f"tensions {said} N leave the tested range 1 to 9 N"
 
 
@@ -113,9 +114,9 @@ def test_only_lines_that_legs_hang_on_warn():
     robot = replace(_mixed(schema.read_robot_file("linear-6"), range(6)), given={THICK: one})
     line = replace(_line(2), tension_range_N=(0.0, 9.0), time_range_s=(0.0, 30.0))
     tau = np.array([[20.0, 5.0, 5.0, 5.0, 5.0, 5.0]])
-    assert draws.wire_warnings(robot, line, tau, 60.0, np.ones((1, 6))) == []
+    assert wire_warnings(robot, line, tau, 60.0, np.ones((1, 6))) == []
     robot = replace(robot, wire=(THICK, *robot.wire[1:-1], "default"))
-    assert draws.wire_warnings(robot, line, tau, 60.0, np.ones((1, 6))) == [
+    assert wire_warnings(robot, line, tau, 60.0, np.ones((1, 6))) == [
         Notice("extrapolation", "1 min is longer than the longest tested hold, 30 s")
     ]
 

@@ -10,7 +10,8 @@ from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.effects.rivals import AtOnce, Logarithmic, NotInTime, PowerLaw, TwoModes
 from wirebayes.robot.export import files
 from wirebayes.robot.mechanics import schema
-from wirebayes.robot.mechanics.draws import WireDraws, for_robot, wire_warnings
+from wirebayes.robot.mechanics.draws import WireDraws, for_robot
+from wirebayes.robot.mechanics.wire_doubts import wire_warnings
 from wirebayes.robot.motion.creep import HoldCreep, fresh
 from wirebayes.wire.effect import Amplitude, Effect
 from wirebayes.wire.fresh import FreshSample

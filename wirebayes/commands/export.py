@@ -10,7 +10,8 @@ from wirebayes.json_files.export import ExportSummary
 from wirebayes.result_warnings import Notice, to_json
 from wirebayes.robot.export import files
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.draws import WireDraws, doubts
+from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.wire_doubts import doubts
 from wirebayes.robot.motion.home import home_notices
 from wirebayes.robot.motion.plausible import robot_notices
 from wirebayes.strict.files import PathLike

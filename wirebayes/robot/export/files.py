@@ -19,10 +19,11 @@ from wirebayes.robot.export.robot_models import cut_from, sdf, urdf
 from wirebayes.robot.export.working_spring import WorkingSpring, first_fitted, fresh_sample_of, working_spring
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Drums, Robot
-from wirebayes.robot.mechanics.draws import WireDraws, doubts, for_robot, lines_of
+from wirebayes.robot.mechanics.draws import WireDraws, for_robot, lines_of
 from wirebayes.robot.mechanics.drums import motor_angle, paid_out
 from wirebayes.robot.mechanics.rotation import matrix, vector
 from wirebayes.robot.mechanics.winches import mean_of_each_winch, of_each_leg, of_each_winch, turned_by
+from wirebayes.robot.mechanics.wire_doubts import doubts
 from wirebayes.robot.mechanics.wires import Wires, stretched_length, tension
 from wirebayes.robot.motion import inverse
 from wirebayes.sentences import short

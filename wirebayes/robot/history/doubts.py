@@ -9,7 +9,7 @@ from wirebayes.robot.history.corrections import Target
 from wirebayes.robot.history.estimate import Estimate
 from wirebayes.robot.history.follow import Track
 from wirebayes.robot.history.history import History
-from wirebayes.robot.mechanics import draws, sag
+from wirebayes.robot.mechanics import sag, wire_doubts
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.motion import inverse, plausible
@@ -82,7 +82,7 @@ def history_warnings(
         *_contradicted(history, found, line.count),
         *_unsure_clock(history, content),
         *_dynamics(history.times_s, position),
-        *draws.wire_warnings(robot, line, found.track.tension_N, longest_s, lengths),
+        *wire_doubts.wire_warnings(robot, line, found.track.tension_N, longest_s, lengths),
         *plausible.robot_notices(robot),
         *plausible.strain_notices(robot, line, tension[-1]),
         *sag.sag_warnings_of_poses(robot, position, found.plain.rotation[0], tension),

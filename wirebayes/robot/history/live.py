@@ -23,9 +23,10 @@ from wirebayes.robot.history.readings import Information, Sensors, reading_weigh
 from wirebayes.robot.history.unknowns import LogUnknowns, Uncertain, slopes, unknowns
 from wirebayes.robot.mechanics import firmware
 from wirebayes.robot.mechanics.description import Poses, Robot
-from wirebayes.robot.mechanics.draws import WireDraws, doubts
+from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.rotation import antisymmetric, matrix
 from wirebayes.robot.mechanics.winches import mean_of_each_winch, of_each_leg, of_each_winch
+from wirebayes.robot.mechanics.wire_doubts import doubts
 from wirebayes.robot.motion import balance, forward, inverse, mixed, path, plausible
 from wirebayes.robot.motion.creep import HoldCreep
 

@@ -19,7 +19,7 @@ from wirebayes.json_files.values import Band
 from wirebayes.numeric.typing import Floats
 from wirebayes.progress import Progress, ShareDone, part_of, shares_of, silent
 from wirebayes.result_warnings import Notice, NoticeJson, to_json
-from wirebayes.robot.mechanics import draws, drums, sag, statics
+from wirebayes.robot.mechanics import draws, drums, sag, statics, wire_doubts
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Drums, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
@@ -285,7 +285,7 @@ def _weak(commands: inverse.Commands) -> list[Notice]:
 def _untested(held: _Held) -> list[Notice]:
     """A warning for each way in which the pose leaves what was tested or what the model knows."""
     robot, request, commands = held.robot, held.request, held.commands
-    out = draws.wire_warnings(robot, held.line, held.tension_N, float(request.times_s[-1]), commands.zero_m)
+    out = wire_doubts.wire_warnings(robot, held.line, held.tension_N, float(request.times_s[-1]), commands.zero_m)
     out += sag.sag_warnings(robot, request.position_m, request.rotation, held.tension_N[0])
     return out if robot.drums is None else out + _emptied(robot.drums, commands.joint_m[commands.feasible])
 

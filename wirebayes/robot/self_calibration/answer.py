@@ -18,8 +18,8 @@ from wirebayes.progress import Progress, silent
 from wirebayes.result_warnings import Notice, to_json
 from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.draws import doubts
 from wirebayes.robot.mechanics.sag import sag_warnings_of_poses
+from wirebayes.robot.mechanics.wire_doubts import doubts
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import control, hanging, home, inverse, plausible
 from wirebayes.robot.self_calibration import observability, sensors

@@ -151,10 +151,11 @@ def _more_creep(about: _About, creep: Grown, since: State) -> Floats:
 
 def _by_earlier(about: _About, creep: Grown, lengths: _Lengths) -> Floats | None:
     """(p, p, w, w) slopes of every hold's loops, as `_weigh_loops` has them, by the tensions of earlier holds."""
-    if not creep.by_pull.any():
+    longer = lengths.by_earlier(creep)
+    if not longer.any():
         return None
     robot = about.here
-    slope = -lengths.bare[:, None] * lengths.by_earlier(creep) / about.noise.joint_m
+    slope = -lengths.bare[:, None] * longer / about.noise.joint_m
     alone = _errors_apart(robot)
     mixes = np.eye(robot.legs) if alone is None else alone
     return mixes * slope[:, :, None]
