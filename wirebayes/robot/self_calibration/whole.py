@@ -31,6 +31,7 @@ from wirebayes.robot.self_calibration.strain import Grown
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 
 _ROUNDS = 60  # of noise and creep: most end in ten
+_FINER_ROUNDS = 12  # with slopes by every tension: of 22 searches of drawn robots the longest took seven
 # Rounds after which a search is given up whose loops are open by so much of the span, and by more than stated errors
 # explain: they close no more. Of sessions that fit, however rough, they are open by a twentieth at most then; some go
 # astray later and come back.
@@ -145,17 +146,17 @@ class _Search:
         Slopes by every tension are right about the mode alone, so they come in once nothing moves without them.
         """
         roughly, finely = shares_of(progress, 2)
-        found = self._until_still(roughly)
+        found = self._until_still(_ROUNDS, roughly)
         if not (found.converged and self.unknowns.prior.creeps):
             return found
         self.each = True
-        finer = self._until_still(finely)
+        finer = self._until_still(_FINER_ROUNDS, finely)
         return finer if finer.converged else found
 
-    def _until_still(self, progress: ShareDone) -> Whole:
-        """The posterior where nothing moves on with one kind of slopes."""
-        for taken in range(_ROUNDS):
-            progress(taken / _ROUNDS)
+    def _until_still(self, most: int, progress: ShareDone) -> Whole:
+        """The posterior where nothing moves on with one kind of slopes; not converged after so many rounds."""
+        for taken in range(most):
+            progress(taken / most)
             found = self._round()
             sd = np.sqrt(np.diag(found.covariance))
             change = self.state.white - self.passed[-1].white
