@@ -120,9 +120,9 @@ WIRE = {"k1": 1200.0, "B": 0.5, "U": 0.8, "k2": 0.03, "N": 0.7, "preload": 0.4, 
     "drive",
     [
         Drive(),
-        Drive(speed=0.1),
+        pytest.param(Drive(speed=0.1), marks=pytest.mark.slow),
         Drive(shape="settling"),
-        Drive(rate=1.0),
+        pytest.param(Drive(rate=1.0), marks=pytest.mark.slow),
         Drive(rate=1.0, shape="jump"),
         Drive(rate=1.0, shape="jump", noise_mm=0.0, before=1.0),
     ],
@@ -188,7 +188,8 @@ def stamped(path, rate, tick, *, clock=False, channel="", columns="Time (s),Disp
 
 
 @pytest.mark.parametrize(
-    ("rate", "tick", "clock"), [(10.0, 1.0, False), (10.0, 1.0, True), (3.3, 1.0, False), (100.0, 0.1, False)]
+    ("rate", "tick", "clock"),
+    [(10.0, 1.0, False), (10.0, 1.0, True), (3.3, 1.0, False), pytest.param(100.0, 0.1, False, marks=pytest.mark.slow)],
 )
 def test_readings_of_a_clock_too_coarse_for_its_rate_are_spread_over_its_ticks(tmp_path, rate, tick, clock):
     path = tmp_path / "raw.csv"
