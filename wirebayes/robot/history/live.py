@@ -21,12 +21,11 @@ from wirebayes.robot.history.live_input import checked_number, checked_reading, 
 from wirebayes.robot.history.live_pose import LivePose, row_quantiles
 from wirebayes.robot.history.readings import Information, Sensors, reading_weight, sensors
 from wirebayes.robot.history.unknowns import LogUnknowns, Uncertain, slopes, unknowns
-from wirebayes.robot.mechanics import firmware
+from wirebayes.robot.mechanics import firmware, wire_doubts
 from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.rotation import antisymmetric, matrix
 from wirebayes.robot.mechanics.winches import mean_of_each_winch, of_each_leg, of_each_winch
-from wirebayes.robot.mechanics.wire_doubts import doubts
 from wirebayes.robot.motion import balance, forward, inverse, mixed, path, plausible
 from wirebayes.robot.motion.creep import HoldCreep
 
@@ -82,7 +81,7 @@ class LiveEstimator:
         self._rng = np.random.default_rng(seed)
         known = unknowns(robot, line, errors, self._rng)
         self._bare, self.robot, self._reads = robot, robot, reads
-        self.warnings = (*doubts(robot, line), *plausible.robot_notices(robot))
+        self.warnings = (*wire_doubts.doubts(robot, line), *plausible.robot_notices(robot))
         self._start, self._last = start, -np.inf
         self._n = line.count
         self._prepare_columns(known)
