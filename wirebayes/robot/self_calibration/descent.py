@@ -12,7 +12,7 @@ from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.self_calibration.earlier_tensions import followed
-from wirebayes.robot.self_calibration.equations import Equations, Holds, Noise, State
+from wirebayes.robot.self_calibration.equations import LEAST_DAMPING, Equations, Holds, Noise, State, own_normal
 from wirebayes.robot.self_calibration.linearisation import linearised
 from wirebayes.robot.self_calibration.strain import Grown
 from wirebayes.robot.self_calibration.unknowns import Unknowns
@@ -47,7 +47,7 @@ def eliminated(e: Equations, white: Floats, damping: float) -> NormalEquations:
     """
     by_hold, by_robot = e.by_hold, e.by_robot
     residual = e.residual[..., None]
-    inverse = inv(_normal(by_hold, damping + 1e-13))
+    inverse = inv(own_normal(by_hold, damping + LEAST_DAMPING))
     mixed = by_hold.mT @ by_robot
     follows = -inverse @ mixed
     alone = -inverse @ (by_hold.mT @ residual)
@@ -58,13 +58,6 @@ def eliminated(e: Equations, white: Floats, damping: float) -> NormalEquations:
     prior = (1.0 + damping) * np.eye(len(white))
     matrix = of_each_hold.sum(0) + prior + damping * np.diag(squares)
     return NormalEquations(follows, alone[..., 0], inverse, matrix, slope + white)
-
-
-def _normal(by_hold: Floats, damping: float) -> Floats:
-    """Normal matrices of the holds' own unknowns, their diagonals larger by a share."""
-    normal = by_hold.mT @ by_hold
-    diagonal = np.einsum("pii->pi", normal)
-    return normal + damping * diagonal[:, None] * np.eye(normal.shape[1])
 
 
 @dataclass(frozen=True)
@@ -170,7 +163,7 @@ class _Target:
         """
         e, state = here.equations, here.state
         slope = e.by_hold.mT @ e.residual[..., None]
-        hold = -solve(_normal(e.by_hold, 1e-12), slope)[..., 0]
+        hold = -solve(own_normal(e.by_hold, 1e-12), slope)[..., 0]
         there = _stepped(self.unknowns.robot, state, np.zeros_like(state.white), np.nan_to_num(hold))
         ahead = self.equations(there)
         better = (ahead.residual**2).sum(1) < (e.residual**2).sum(1)

@@ -7,9 +7,7 @@ from scipy.linalg import solve_triangular
 
 from wirebayes.numeric.linear_algebra import solve
 from wirebayes.numeric.typing import Floats
-from wirebayes.robot.self_calibration.equations import Equations
-
-_LEAST = 1e-13  # of a diagonal: what keeps the normal equations of a hold regular
+from wirebayes.robot.self_calibration.equations import LEAST_DAMPING, Equations, own_normal
 
 
 def followed(e: Equations) -> Equations:
@@ -42,8 +40,5 @@ def followed(e: Equations) -> Equations:
 
 def _tensions_by_residuals(e: Equations, legs: int) -> Floats:
     """(p, w, k) how the tensions that fit a hold's equations best answer to their residuals."""
-    normal = e.by_hold.mT @ e.by_hold
-    diagonal = np.einsum("pii->pi", normal)
-    regular = normal + _LEAST * diagonal[:, None] * np.eye(normal.shape[1])
-    best = solve(regular, e.by_hold.mT)
+    best = solve(own_normal(e.by_hold, LEAST_DAMPING), e.by_hold.mT)
     return -best[:, -legs:]

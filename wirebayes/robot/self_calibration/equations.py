@@ -15,6 +15,7 @@ from wirebayes.robot.self_calibration.session import Session
 from wirebayes.robot.self_calibration.unknowns import Parts
 
 EXACT = 1e-8  # of the robot's span: what is exact is known this well, far below anything that matters
+LEAST_DAMPING = 1e-13  # of a diagonal: what keeps the normal equations of a hold regular
 FRICTIONLESS = 1e-5  # of the weight: balance holds this well
 
 
@@ -106,6 +107,13 @@ class Equations:
     rows: dict[str, slice]
     known: Bools
     by_earlier: Floats | None = None
+
+
+def own_normal(by_hold: Floats, damping: float) -> Floats:
+    """Normal matrices ``(p, d + w, d + w)`` of the holds' own unknowns, their diagonals larger by a share."""
+    normal = by_hold.mT @ by_hold
+    diagonal = np.einsum("pii->pi", normal)
+    return normal + damping * diagonal[:, None] * np.eye(normal.shape[1])
 
 
 def pulled(latent_N: Floats, soft_N: float) -> tuple[Floats, Floats]:
