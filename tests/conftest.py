@@ -1,7 +1,10 @@
 """Fixtures that several tests share."""
 
+import gc
+import importlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -33,6 +36,33 @@ resolution_N = 0.01
 readings = "a.csv"
 unrecorded_holds = [{ before_hold = 3, displacement_mm = 2.0, duration_s = 45.0 }]
 """
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection(session: pytest.Session) -> Iterator[None]:
+    """Collect without looking for garbage: a million objects are made, and all of them stay."""
+    gc.disable()
+    compile_a_share(session.config)
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
+
+
+def compile_a_share(config: pytest.Config) -> None:
+    """Import a share of all test files before the others, as the other workers do with theirs.
+
+    Each worker collects every file, and the first to import one rewrites and compiles it, which takes most of the time;
+    in the same order all would do the same work at once. Only where everything is collected.
+    """
+    name, workers = (os.environ.get(f"PYTEST_XDIST_WORKER{end}", "") for end in ("", "_COUNT"))
+    if not name or config.args != config.getini("testpaths"):
+        return
+    files = sorted(Path(__file__).parent.rglob("test_*.py"))
+    for file in files[int(name.removeprefix("gw")) :: int(workers)]:
+        with suppress(Exception, pytest.skip.Exception):  # collection says what is wrong with it
+            importlib.import_module(".".join(file.relative_to(config.rootpath).with_suffix("").parts))
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 """One direction of dependence: a package imports only from packages of layers below its own."""
 
 import ast
+from functools import cache
 from pathlib import Path
 
 import wirebayes
@@ -34,6 +35,7 @@ ROBOT_MAY_USE = NEUTRAL | {"wire", "robot"}
 MAY_USE_ROBOT = {"report", "paper", "views", "commands", "app", "cli", "__init__"}
 
 
+@cache
 def imports() -> set[tuple[str, str, str]]:
     """Importing package, imported package and file of every import within the project, also those inside functions."""
     found = set()

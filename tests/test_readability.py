@@ -8,12 +8,12 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 from analyses.project.density import Body, functions_of, local_names, nodes
 from analyses.project.measures import homonyms, trees
 
 ROOT = Path(__file__).parent.parent
-SOURCES = {path: path.read_text() for path in sorted((ROOT / "wirebayes").rglob("*.py"))}
-TREES = {path: ast.parse(source) for path, source in SOURCES.items()}
 
 # What click shows as help documents the commands.
 CLI = ROOT / "wirebayes" / "cli"
@@ -23,6 +23,27 @@ MOST_NAMES = 20  # assigned in a function: more is not kept in mind
 
 # A name that says all there is: a unit in seconds, or a constant of mathematics.
 NEEDS_NO_REASON = re.compile(r"_?(MINUTE|HOUR|DAY|YEAR)(_S)?|_?(HALF_)?LOG_2PI")
+
+
+Trees = dict[Path, ast.Module]
+Classes = dict[str, list[ast.ClassDef]]
+
+
+# Only while the tests of this file run: every process collects it, and a million nodes slow each one down.
+@pytest.fixture(scope="module")
+def sources() -> dict[Path, str]:
+    return {path: path.read_text() for path in sorted((ROOT / "wirebayes").rglob("*.py"))}
+
+
+@pytest.fixture(scope="module")
+def written(sources) -> Trees:
+    return {path: ast.parse(source) for path, source in sources.items()}
+
+
+@pytest.fixture(scope="module")
+def bare() -> Trees:
+    """Without docstrings."""
+    return trees(ROOT)
 
 
 def functions(tree: ast.Module) -> Iterator[tuple[ast.FunctionDef, ast.ClassDef | None]]:
@@ -45,38 +66,42 @@ def explains_parameters(function: ast.FunctionDef) -> bool:
     return "Parameters\n----------\n" in (ast.get_docstring(function) or "")
 
 
-def overrides_an_explained_method(method: ast.FunctionDef, owner: ast.ClassDef) -> bool:
+def overrides_an_explained_method(method: ast.FunctionDef, owner: ast.ClassDef, classes: Classes) -> bool:
     for base in (base.id for base in owner.bases if isinstance(base, ast.Name)):
-        for parent in CLASSES.get(base, ()):
+        for parent in classes.get(base, ()):
             same = [m for m in parent.body if isinstance(m, ast.FunctionDef) and m.name == method.name]
-            if any(map(explains_parameters, same)) or overrides_an_explained_method(method, parent):
+            if any(map(explains_parameters, same)) or overrides_an_explained_method(method, parent, classes):
                 return True
     return False
 
 
-CLASSES: dict[str, list[ast.ClassDef]] = {}
-for _tree in TREES.values():
-    for _node in _tree.body:
-        if isinstance(_node, ast.ClassDef):
-            CLASSES.setdefault(_node.name, []).append(_node)
+def classes_of(written: Trees) -> Classes:
+    """By name: the classes of all files that are called so."""
+    found: Classes = {}
+    for tree in written.values():
+        for node in tree.body:
+            if isinstance(node, ast.ClassDef):
+                found.setdefault(node.name, []).append(node)
+    return found
 
 
-def unexplained() -> list[str]:
+def unexplained(written: Trees) -> list[str]:
+    classes = classes_of(written)
     return [
         f"{path.relative_to(ROOT)}:{function.lineno} {function.name}"
-        for path, tree in TREES.items()
+        for path, tree in written.items()
         if CLI not in path.parents
         for function, owner in functions(tree)
         if not function.name.startswith("_")
         and not (owner is not None and owner.name.startswith("_"))
         and len(parameters(function)) >= MANY_PARAMETERS
         and not explains_parameters(function)
-        and not (owner is not None and overrides_an_explained_method(function, owner))
+        and not (owner is not None and overrides_an_explained_method(function, owner, classes))
     ]
 
 
-def test_public_functions_with_several_parameters_explain_them():
-    assert unexplained() == []
+def test_public_functions_with_several_parameters_explain_them(written):
+    assert unexplained(written) == []
 
 
 def holds_a_number(value: ast.expr) -> bool:
@@ -91,10 +116,10 @@ def has_a_reason(assignment: ast.stmt, lines: list[str]) -> bool:
     return assignment.lineno > 1 and lines[assignment.lineno - 2].lstrip().startswith("#")
 
 
-def constants_without_a_reason() -> list[str]:
+def constants_without_a_reason(written: Trees, sources: dict[Path, str]) -> list[str]:
     found = []
-    for path, tree in TREES.items():
-        lines = SOURCES[path].splitlines()
+    for path, tree in written.items():
+        lines = sources[path].splitlines()
         for node in tree.body:
             if not isinstance(node, ast.Assign | ast.AnnAssign) or node.value is None:
                 continue
@@ -110,14 +135,14 @@ def constants_without_a_reason() -> list[str]:
     return found
 
 
-def test_constants_have_a_reason():
-    assert constants_without_a_reason() == []
+def test_constants_have_a_reason(written, sources):
+    assert constants_without_a_reason(written, sources) == []
 
 
-def test_no_function_returns_a_bare_tuple_of_more_than_three():
+def test_no_function_returns_a_bare_tuple_of_more_than_three(written):
     """Four values that travel together get a named dataclass."""
     found = []
-    for path, tree in TREES.items():
+    for path, tree in written.items():
         for node in ast.walk(tree):
             if isinstance(node, ast.FunctionDef) and isinstance(node.returns, ast.Subscript):
                 kind, inside = node.returns.value, node.returns.slice
@@ -126,10 +151,10 @@ def test_no_function_returns_a_bare_tuple_of_more_than_three():
     assert found == []
 
 
-def sizes() -> dict[str, tuple[int, int]]:
+def sizes(bare: Trees) -> dict[str, tuple[int, int]]:
     """Syntax nodes and local names of every function and method by its place; what is nested in one counts to it."""
     found = {}
-    for path, tree in trees(ROOT).items():
+    for path, tree in bare.items():
         for function, owner in functions(tree):
             place = f"{path}:{owner.name + '.' if owner else ''}{function.name}"
             found[place] = nodes(function), len(local_names(function))
@@ -140,8 +165,8 @@ def is_dense(nodes: int, names: int) -> bool:
     return nodes > MOST_NODES or names > MOST_NAMES
 
 
-def test_no_function_is_dense():
-    assert [place for place, size in sizes().items() if is_dense(*size)] == [], "split it, or give it fewer names"
+def test_no_function_is_dense(bare):
+    assert [place for place, size in sizes(bare).items() if is_dense(*size)] == [], "split it, or give it fewer names"
 
 
 def test_what_is_dense_is_found():
@@ -161,8 +186,8 @@ def test_a_body_has_neither_signature_nor_annotations_comments_or_blank_lines():
     assert bodies[0].nodes == bodies[1].nodes == 8
 
 
-def test_no_public_name_stands_for_two_things():
-    assert homonyms(trees(ROOT)) == {}, "give each a name of its own, or an underscore where one file alone uses it"
+def test_no_public_name_stands_for_two_things(bare):
+    assert homonyms(bare) == {}, "give each a name of its own, or an underscore where one file alone uses it"
 
 
 def test_a_name_in_two_files_is_found():
