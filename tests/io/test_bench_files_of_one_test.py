@@ -6,6 +6,7 @@ import pytest
 import wirebayes as wb
 from tests.simulated import SOFTER
 from wirebayes.errors import InputError
+from wirebayes.io.bench.undecided import Undecided
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
 SETTINGS = tuple(float(x) for x in range(1, 12))
@@ -72,6 +73,42 @@ def test_dates_go_before_names_and_tell_rests(tmp_path, tensions):
     assert [hold.setting for hold in e.holds] == list(SETTINGS[::-1])
     assert [hold.duration_s for hold in e.holds] == [60.0] * 10 + [30.0]
     assert content["notes"][0].startswith("holds of one test in the order of their dates: hold11.csv, hold10.csv")
+
+
+def in_spring(hold, time, force):
+    """A hold a day, from the 9th of March on, in American dates; names say nothing of the order."""
+    return f"03/{9 + hold:02}/2026 10:{time // 60:02.0f}:{time % 60:02.0f}", SETTINGS[hold], force
+
+
+def test_a_file_with_a_day_above_twelve_tells_how_dates_are_written_in_all(tmp_path, tensions):
+    header = "Time;Weg [mm];Kraft [N]"
+    write(tmp_path / "raw", tensions, "{hold}.csv", header=header, cells=in_spring)
+    e, _ = read(tmp_path / "raw", each_file="hold")
+    assert [hold.start_s for hold in e.holds] == [86400.0 * day for day in range(11)]
+
+
+@pytest.mark.parametrize(("unit", "order"), [("mm/dd/yyyy", [0, 1, 2, 3]), ("dd/mm/yyyy", [1, 3, 0, 2])])
+@pytest.mark.parametrize("in_header", [True, False])
+def test_the_order_of_files_follows_what_is_said_of_their_dates(tmp_path, tensions, unit, order, in_header):
+    days = ("03/11/2026", "04/01/2026", "04/12/2026", "05/02/2026")
+
+    def cells(hold, time, force):
+        return f"{days[hold]} 10:{time // 60:02.0f}:{time % 60:02.0f}", SETTINGS[hold], force
+
+    header = f"Time ({unit});Weg [mm];Kraft [N]" if in_header else "Time;Weg [mm];Kraft [N]"
+    write(tmp_path / "raw", tensions[:4], "{hold}.csv", header=header, cells=cells)
+    mapping = [] if in_header else [f"Time=time [{unit}]"]
+    e, _ = read(tmp_path / "raw", each_file="hold", mapping=mapping)
+    assert [hold.setting for hold in e.holds] == [SETTINGS[i] for i in order]
+
+
+def test_dates_of_files_that_nothing_decides_are_a_question(tmp_path, tensions):
+    header = "Time;Weg [mm];Kraft [N]"
+    write(tmp_path / "raw", tensions[:3], "{hold}.csv", header=header, cells=in_spring)
+    with pytest.raises(Undecided) as question:
+        read(tmp_path / "raw", each_file="hold")
+    assert list(question.value.answers) == ["--map Time=time [dd/mm/yyyy]", "--map Time=time [mm/dd/yyyy]"]
+    assert "1.csv to 3.csv, line 2 of 1.csv" in str(question.value)
 
 
 def test_what_no_column_holds_is_in_the_names_of_the_files(tmp_path, tensions):

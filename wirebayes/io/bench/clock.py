@@ -169,10 +169,22 @@ def _minutes_go_round(values: Floats) -> bool:
     return bool(((after > near) & (np.abs(after - values[0]) > near)).any())
 
 
-def first_moment_s(table: RawTable, column: int) -> float:
-    """Seconds from the beginning of the calendar to the first reading, in a column of dates with times."""
-    moments = _moments(table, column, None)
-    return float(_days(table, column, moments)[0]) + _value(moments[0], _HOUR)
+def calendar_s(table: RawTable, column: int, unit: Unit | None) -> Floats:
+    """Seconds from the beginning of the calendar to each reading (r,), in a column of dates with times.
+
+    Parameters
+    ----------
+    unit : Unit or None
+        Where the header or the user says whether dates begin with the day.
+
+    Raises
+    ------
+    UndecidedDates
+        Nobody says it, and dates may begin with the day or with the month.
+    """
+    moments = _moments(table, column, unit)
+    of_day = [_value(found, _HOUR) for found in moments]
+    return _days(table, column, moments, unit) + np.array(of_day)
 
 
 def _check_hours_go_beyond_twelve(table: RawTable, column: int, values: Floats) -> None:

@@ -17,10 +17,12 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.io.bench import clock
 from wirebayes.io.bench.dates_apart import dated
-from wirebayes.io.bench.header import is_called_of_sample, is_of
-from wirebayes.io.bench.quantities import Role, quantity_unit
+from wirebayes.io.bench.header import header_meant, is_called_of_sample, is_of, name_and_unit
+from wirebayes.io.bench.mapping import mapped_columns
+from wirebayes.io.bench.quantities import Role, Unit, quantity_unit
 from wirebayes.io.bench.sheet import SheetRow, moment
 from wirebayes.io.bench.table import RawTable
+from wirebayes.numeric.typing import Floats
 from wirebayes.sentences import listed
 
 HOLD = "hold"  # what says that each file is one, and the name of the column that numbers them
@@ -64,7 +66,7 @@ def one_table(tables: Sequence[RawTable], each_file: str, mapping: Sequence[str]
     """
     _check_alike(tables)
     given = list(tables)
-    tables, by = _in_order(given)
+    tables, by = _in_order(given, mapping)
     order = f"the order of their {by}: {_names(tables)}"
     notes = [f"holds of one test in {order}"]
     settings, role, source = _settings(tables, each_file, mapping)
@@ -89,16 +91,21 @@ def _names(tables: Sequence[RawTable]) -> str:
     return listed([table.sheet.path.name for table in tables])
 
 
-def _in_order(tables: Sequence[RawTable]) -> tuple[list[RawTable], str]:
-    """The tables as the holds followed each other, and by what of them that is known."""
+def _in_order(tables: Sequence[RawTable], mapping: Sequence[str]) -> tuple[list[RawTable], str]:
+    """The tables as the holds followed each other, and by what of them that is known.
+
+    Dates are read in all files together: whether they begin with the day may be evident in one of them only.
+    """
     tables = sorted(tables, key=lambda table: _as_people_count(table.sheet.path))
-    moments = []
-    for table in tables:
-        begun = _first_moment(dated(table))
-        if begun is None:
-            return tables, "names"
-        moments.append(begun)
-    in_order = np.argsort(moments, kind="stable")
+    with_dates = [dated(table) for table in tables]
+    rows, pieces = _rows(with_dates, [()] * len(tables))
+    sheet = replace(with_dates[0].sheet, path=path_of_all([table.sheet.path for table in tables]))
+    calendar = _calendar_s(replace(with_dates[0], sheet=sheet, rows=rows, pieces=pieces), mapping)
+    if calendar is None:
+        return tables, "names"
+    lengths = [len(table.rows) for table in tables]
+    begins = np.cumsum([0, *lengths[:-1]])
+    in_order = np.argsort(calendar[begins], kind="stable")
     return [tables[i] for i in in_order], "dates"
 
 
@@ -226,10 +233,20 @@ def _without_numbers(table: RawTable) -> tuple[str, ...]:
     return tuple("" if is_of(table, i, "hold") else name for i, name in enumerate(table.header))
 
 
-def _first_moment(table: RawTable) -> float | None:
-    """When the first reading of a file was taken, where a column has dates with times."""
+def _calendar_s(table: RawTable, mapping: Sequence[str]) -> Floats | None:
+    """When each reading was taken, in seconds of the calendar, where a column has dates with times."""
     for column in range(len(table.header)):
         found = [moment(cell) for cell in table.column(column)]
         if all(m is not None and m["date"] and m["first"] for m in found):
-            return clock.first_moment_s(table, column)
+            return clock.calendar_s(table, column, _form_of_dates(table, column, mapping))
     return None
+
+
+def _form_of_dates(table: RawTable, column: int, mapping: Sequence[str]) -> Unit | None:
+    """How dates are written, by what the user says of their column or by its header; None where neither says it."""
+    header = table.header[column]
+    about = [text for text in mapping if header_meant(text) == header]
+    for _, role, stated in mapped_columns(table, about):
+        if role == "time" and stated:
+            return quantity_unit(stated, "time")
+    return name_and_unit(header, "time")[1]
