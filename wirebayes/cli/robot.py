@@ -116,7 +116,7 @@ def pose_command(
     with progress() as report:
         found = run(
             robot,
-            named_lines(wires or []),
+            named_lines(wires),
             position=position,
             rotation=rotation,
             times=times,
@@ -141,7 +141,7 @@ def pose_command(
             output=folder_for("pose", robot, output),
             progress=report,
         )
-    conclude(found, Given(typed(robot), _typed_options(wires or [])), as_json=as_json, quiet=quiet)
+    conclude(found, Given(typed(robot), _typed_options(wires)), as_json=as_json, quiet=quiet)
 
 
 def calibrate_command(
@@ -206,7 +206,7 @@ def calibrate_command(
         found = run(
             robot,
             readings,
-            named_lines(wires or []),
+            named_lines(wires),
             tension_sd=tension_sd,
             tilt_sd=tilt_sd,
             reference_sd=reference_sd,
@@ -225,7 +225,7 @@ def calibrate_command(
             output=folder_for("calibrate", robot, output),
             progress=report,
         )
-    conclude(found, Given(typed(robot), _typed_options(wires or [])), as_json=as_json, quiet=quiet)
+    conclude(found, Given(typed(robot), _typed_options(wires)), as_json=as_json, quiet=quiet)
 
 
 def export_command(
@@ -251,7 +251,7 @@ def export_command(
 
     exported = run(
         robot,
-        named_lines(wires or []),
+        named_lines(wires),
         tensions=tensions,
         times=times,
         draws=draws,
@@ -260,11 +260,13 @@ def export_command(
         seed=seed,
         output=folder_for("export", robot, output),
     )
-    print_answer(exported, Given(typed(robot), _typed_options(wires or [])))
+    print_answer(exported, Given(typed(robot), _typed_options(wires)))
 
 
-def _typed_options(wires: list[str]) -> str:
+def _typed_options(wires: list[str] | None) -> str:
     """``--wires`` as it was given."""
     from wirebayes.views.result import typed
 
+    if wires is None:
+        return ""
     return "".join(f" --wires {typed(one)}" for one in wires)

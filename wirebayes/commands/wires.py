@@ -208,7 +208,7 @@ def _check_alike(name: str, first: WireDraws, other: str, line: WireDraws) -> No
             raise InputError(f"--wires: found {found}, expected one for all wires")
 
 
-def named_lines(texts: Sequence[str]) -> Wires | None:
+def named_lines(texts: Sequence[str] | None) -> Wires | None:
     """What ``--wires`` was given: a line, or several times ``NAME=LINE``; a line is a folder, or some with commas."""
     if not texts:
         return None

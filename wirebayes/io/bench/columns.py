@@ -106,7 +106,7 @@ def _said(table: RawTable, mapped: Sequence[tuple[int, str, str]]) -> tuple[Colu
             found = f"{roles[known].header} and {table.header[index]} both as {known}"
             raise InputError(f"--map: found {found}, expected one column for it")
         try:
-            roles[known] = _column(table, index, known, unit)
+            roles[known] = column_as(table, index, known, unit)
         except Undecided as question:
             open_questions[known] = question
     return roles, open_questions
@@ -150,7 +150,7 @@ def _one(table: RawTable, likely: Sequence[int], role: Role) -> Column:
         different = finest_of_same(table, different, role)
     if len(different) == 1:
         (only,) = different
-        return _column(table, only, role, None)
+        return column_as(table, only, role)
     if role == "time":
         return _one_clock(table, different)
     raise _several(table, different, role)
@@ -180,7 +180,7 @@ def _without_errors(table: RawTable, likely: Sequence[int], role: Role) -> list[
 
 def _one_clock(table: RawTable, likely: Sequence[int]) -> Column:
     """The best of several columns of time that agree; a question where they do not."""
-    columns = [_column(table, index, "time", None) for index in likely]
+    columns = [column_as(table, index, "time") for index in likely]
     found = [clock_of(table, column.index, column.unit) for column in columns]
     clocks = [clock for clock in found if clock is not None]
     if len(clocks) < len(columns):
@@ -197,8 +197,8 @@ def _one_clock(table: RawTable, likely: Sequence[int]) -> Column:
     return columns[best_clock(clocks)]
 
 
-def column_as(table: RawTable, index: int, role: Role) -> Column:
-    """A column as one of a quantity, in the unit that the file says.
+def column_as(table: RawTable, index: int, role: Role, stated: str | None = None) -> Column:
+    """A column as one of a quantity, in the unit that the user states, else in that of the file.
 
     Parameters
     ----------
@@ -206,16 +206,14 @@ def column_as(table: RawTable, index: int, role: Role) -> Column:
         Of the column.
     role : str
         The quantity.
+    stated : str, optional
+        The unit that the user states.
 
     Raises
     ------
     InputError
         It has no unit of the quantity.
     """
-    return _column(table, index, role, None)
-
-
-def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Column:
     header = table.header[index]
     if role == "hold":
         return Column(role, index, header, None)
@@ -264,7 +262,7 @@ def _are_alike(unit: Unit, other: Unit) -> bool:
 def _by_unit_alone(table: RawTable, index: int, role: Role) -> Column:
     """The column of a quantity whose header is a unit of it and nothing else."""
     unit = table.header[index].strip("[]() ")
-    return replace(_column(table, index, role, unit), by_unit_alone=True)
+    return replace(column_as(table, index, role, unit), by_unit_alone=True)
 
 
 def _no_unit(table: RawTable, index: int, role: Role) -> InputError:
@@ -347,7 +345,7 @@ def _missing(table: RawTable, free: Sequence[int], unread: Sequence[int], missin
     role, *more = missing
     for index in free:
         if last_named(table.header[index]) == role:
-            _column(table, index, role, None)  # its unit is another quantity's, which is said
+            column_as(table, index, role)  # its unit is another quantity's, which is said
     found = "found no column of"
     names = [name for name in table.header if name]
     in_doubt = _encoding_in_doubt(table, names)
