@@ -19,8 +19,11 @@ _MARKS = (
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
 _NUL_SHARE = 0.2  # of the bytes: UTF-16 of digits has a half, text none
-# What benches write where it is no Unicode: Western Europe first, then East Asia, Cyrillic, Central Europe.
-_CODE_PAGES = ("cp1252", "latin-1", "gb18030", "cp932", "cp949", "big5", "cp1251", "koi8-r", "cp866", "cp1250")
+# What benches write where it is no Unicode: Western Europe first, then East Asia, Cyrillic, Central Europe,
+# Greece, Turkey.
+_CODE_PAGES = (
+    "cp1252", "latin-1", "gb18030", "cp932", "cp949", "big5", "cp1251", "koi8-r", "cp866", "cp1250", "cp1253", "cp1254",
+)  # fmt: skip
 UNICODE = ("utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32")  # beyond doubt: not worth a word
 # what East Asian keyboards write, one for one: digits, letters, brackets and signs in full width
 _FULL_WIDTH = {code: code - 0xFEE0 for code in range(0xFF01, 0xFF5F)}

@@ -29,10 +29,16 @@ _SPELLINGS = {
     "min.": "min", "mins": "min", "minuten": "min", "minutos": "min", "std": "h", "std.": "h", "hrs": "h",
     "stunden": "h", "heures": "h", "newton": "N", "newtons": "N", "kn": "kN", "kp": "kgf", "pond": "gf", "p": "gf",
     "kg-f": "kgf", "kg_f": "kgf", "lb-f": "lbf", "lb_f": "lbf", "lbsf": "lbf", "lbs": "lb", "n": "N",
+    "sekunder": "s", "minuter": "min", "timmar": "h", "tim": "h", "tim.": "h", "dygn": "d", "dagar": "d",
+    "sekund": "s", "sekundy": "s", "minut": "min", "minuty": "min", "hod": "h", "hod.": "h", "hodin": "h",
+    "hodiny": "h", "dny": "d", "mp": "s", "mp.": "s", "másodperc": "s", "perc": "min", "óra": "h", "nap": "d",
+    "sn": "s", "sn.": "s", "saniye": "s", "dk": "min", "dk.": "min", "dakika": "min", "saat": "h", "gün": "d",
     "millis": "ms", "micros": "µs", "millimeter": "mm", "inches": "inch", "\"": "inch",
     "毫米": "mm", "厘米": "cm", "米": "m", "ミリ": "mm", "秒": "s", "分": "min", "分钟": "min", "小时": "h", "牛": "N",
     "牛顿": "N", "千牛": "kN", "千克": "kg", "公斤": "kg", "克": "g",
     "мм": "mm", "см": "cm", "м": "m", "мкм": "µm", "с": "s", "сек": "s", "мин": "min", "ч": "h", "мс": "ms", "н": "N",
+    "χιλ.": "mm", "χιλιοστά": "mm", "εκ.": "cm", "εκατοστά": "cm", "δευτ.": "s", "δευτερόλεπτα": "s", "λεπτά": "min",
+    "ώρες": "h", "ημέρες": "d", "ν": "N", "κιλά": "kg", "γραμμάρια": "g",
     "кн": "kN", "кгс": "kgf", "гс": "gf", "кг": "kg", "г": "g",
 }  # fmt: skip
 _DAY = "dag"  # in Dutch and the Scandinavian languages; ten grams elsewhere

@@ -13,6 +13,7 @@ from wirebayes.sentences import listed
 _SPECIMEN = (
     "specimen", "sample", "probe", "prufling", "muster", "eprouvette", "echantillon", "probeta", "muestra", "provino",
     "campione", "amostra", "provete", "proefstuk", "monster", "wire", "draht", "draad", "filo", "hilo",
+    "prov", "vzorek", "minta", "numune", "δοκιμιο", "δειγμα",
     "試料", "試験片", "试样",
 )  # fmt: skip
 _TITLE = re.compile(
