@@ -87,7 +87,7 @@ def fit(
         Same seed, same machine: same draws.
     output : path, optional
         Folder for the results. It resumes an interrupted fit of the same configuration and refuses another. Without it,
-        the results lie in a temporary folder, which lasts as long as the posterior.
+        the results lie in a temporary folder, which lasts as long as the posterior. `write_report` adds the page.
     progress : function of (name, done, total), optional
         Called as the work goes on.
     policy : Policy, optional
