@@ -10,6 +10,7 @@ from tests import light
 from wirebayes.cli import main
 from wirebayes.io import paper
 from wirebayes.io.run_folder import read_json
+from wirebayes.model.prior import PowerScaled
 from wirebayes.model.spec import ModelSpec
 from wirebayes.paper import verdicts
 from wirebayes.paper.held_out import Forecast, published_course
@@ -53,9 +54,28 @@ def test_the_product_of_stiffness_and_amount_has_a_verdict_of_its_own():
     prior = {name: np.exp(rng.normal(size=5000)) for name in ("k1", "B", "U", "k2", "N")}
     draws = prior | {"B": 2.0 / prior["k1"] * np.exp(0.01 * rng.normal(size=5000))}
     published = {"k1": 1.0, "B": 2.0, "U": 1.0, "k2": 1.0, "N": 1.0}
-    words = {row["parameter"]: row["verdict"] for row in verdicts.verdict_rows("wire", "hold", draws, prior, published)}
+    rows = verdicts.verdict_rows("wire", "hold", draws, prior, {}, published)
+    words = {row["parameter"]: row["verdict"] for row in rows}
     assert words["k1"] == words["B"] == "not determined"
     assert words["k1*B"] == "inside"
+
+
+def test_creep_is_judged_at_the_typical_tension_and_rate_over_a_typical_hold():
+    """Readings that say how far a wire creeps at 20 N, and nothing of U, say little of the creep at 1 N."""
+    rng = np.random.default_rng(2)
+    tension_N, hold_s = 20.0, 600.0
+    powers = {"B": PowerScaled("U", np.log(tension_N)), "k2": PowerScaled("N", np.log(hold_s))}
+    prior = {name: np.exp(rng.normal(size=5000)) for name in ("k1", "B", "U", "k2", "N")}
+    known = np.exp(0.05 * rng.normal(size=5000))
+    draws = prior | {"B": known * tension_N ** -prior["U"], "k2": known * hold_s ** -prior["N"]}
+    published = {"k1": 1.0, "B": 0.05, "U": 1.0, "k2": 1 / 600, "N": 1.0}
+    rows = {row["parameter"]: row for row in verdicts.verdict_rows("wire", "hold", draws, prior, powers, published)}
+    at_one_newton = {row["parameter"]: row for row in verdicts.verdict_rows("w", "hold", draws, prior, {}, published)}
+    for name in ("B", "k2"):
+        assert rows[name]["contraction"] > 0.99 and rows[name]["verdict"] == "inside"
+        assert at_one_newton[name]["contraction"] < 0.9
+        assert rows[name]["q50"] == at_one_newton[name]["q50"]  # in the units of the paper
+    assert rows["U"]["contraction"] == 0.0
 
 
 def test_creep_of_the_published_parameters_is_equation_5_by_hand():

@@ -148,7 +148,8 @@ def _known(tables: Tables, gallery: Gallery) -> Section:
     )
     caption = (
         "Inside or outside: whether the 90 % interval holds the published value. Not determined: on a logarithmic "
-        "scale the interval has not shrunk to a third of its width before the test."
+        "scale the interval has not shrunk to a third of its width before the test. Contraction is that of the creep "
+        "at the test's typical tension and of its rate over a typical hold, however far these are from 1 N and 1 s."
     )
     table = paper_tables.interval_table(tables["posterior"], caption)
     return Section("What the readings say about each published value", [words, *gallery("known"), table], folded=True)

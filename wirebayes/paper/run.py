@@ -16,7 +16,6 @@ from wirebayes.io.run_folder import open_run, write_csv, write_json
 from wirebayes.model.build import build
 from wirebayes.model.sample import Likelihood
 from wirebayes.model.spec import ModelSpec
-from wirebayes.numeric.typing import Array
 from wirebayes.paper import claim_steps, identification, pictures, section_4, verdicts
 from wirebayes.paper.held_out import Forecast, forecast_held_out
 from wirebayes.processes.workers import workers
@@ -196,8 +195,10 @@ def _rows(
         stored = full[likelihood]
         draws = stored.draws
         tension = stored.sample.tested_tension_N
-        prior = _prior_draws(e, likelihood, seed)
-        out["posterior"] += verdicts.verdict_rows(name, likelihood, draws, prior, published)
+        prior = build([e], (), ModelSpec(likelihood=likelihood)).prior
+        rng = np.random.default_rng(seed_of(seed, "prior", name, likelihood))
+        before = prior.named_draws(_PRIOR_DRAWS, rng)
+        out["posterior"] += verdicts.verdict_rows(name, likelihood, draws, before, prior.powers, published)
         out["creep"] += verdicts.creep_rows(name, likelihood, draws, published, tension, e.length_mm)
         out["held_out"].append(_forecast_row(name, likelihood, seen[likelihood]))
         for suffix in ("", f"-first-{training}"):
@@ -223,12 +224,6 @@ def _draw(
     gallery.unused_holds(experiment, published, seen)
     gallery.ridges(experiment, published, full)
     gallery.prior(experiment, rng)
-
-
-def _prior_draws(experiment: Experiment, likelihood: Likelihood, seed: int) -> dict[str, Array]:
-    prior = build([experiment], (), ModelSpec(likelihood=likelihood)).prior
-    rng = np.random.default_rng(seed_of(seed, "prior", experiment.name, likelihood))
-    return prior.named_draws(_PRIOR_DRAWS, rng)
 
 
 def _measured_row(e: Experiment) -> Row:

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from wirebayes.json_files.summary import CREEP_TIMES_S
+from wirebayes.model.prior import PowerScaled
 from wirebayes.model.sample import MATERIAL
 from wirebayes.numeric.typing import Array
 from wirebayes.paper.least_squares import at
@@ -46,24 +47,32 @@ def verdict_rows(
     likelihood: str,
     draws: Mapping[str, Array],
     prior: Mapping[str, Array],
+    powers: Mapping[str, PowerScaled],
     published: Mapping[str, float],
 ) -> list[dict[str, Any]]:
     """One row a parameter: posterior and prior interval, contraction, published value and verdict.
+
+    Values and intervals are in the paper's units, of creep at 1 N and its rate after 1 s. The contraction is, as on the
+    page of a fit, that of creep at the test's typical tension and of its rate over a typical hold: at 1 N creep is
+    known as badly as 1 N is far from what was tested.
 
     Parameters
     ----------
     experiment, likelihood : str
     draws, prior : mapping of name to (n,) array
         Of the posterior and of the prior.
+    powers : mapping of name to PowerScaled
+        What parameters are multiplied by to be those of the test (`wirebayes.model.prior.Prior`).
     published : mapping of name to float
     """
+    of_test, of_test_before = (_of_test(values, powers) for values in (draws, prior))
     out = []
     for name in (*MATERIAL, PRODUCT):
         after, before = _quantity(name, draws), _quantity(name, prior)
         value = float(_quantity(name, published))
         low, middle, high = interval(after)
         prior_low, _, prior_high = interval(before)
-        shrunk = contraction(after, before)
+        shrunk = contraction(_quantity(name, of_test), _quantity(name, of_test_before))
         out.append(
             {
                 "experiment": experiment,
@@ -130,6 +139,15 @@ def creep_rows(
                 "q95_mm": high,
             }
         )
+    return out
+
+
+def _of_test(values: Mapping[str, Array], powers: Mapping[str, PowerScaled]) -> dict[str, Array]:
+    """Draws, with those of parameters whose unit depends on an exponent in the units of the test."""
+    out = dict(values)
+    for name, (exponent, log_base) in powers.items():
+        power = values[exponent] if isinstance(exponent, str) else exponent
+        out[name] = values[name] * np.exp(log_base * power)
     return out
 
 
