@@ -89,6 +89,10 @@ STUDIES = {
         "samplers.json",
     ),
     "real_wires": ("analyses/discovery/real_wires.py --together --output {folder}/wires.json", "wires.json"),
+    "first_holds": (
+        "-m analyses.discovery.first_holds --wire kite-1.5m --holds 5 6 --output {folder}/holds.json",
+        "holds.json",
+    ),
 }
 REDUCED = {  # of results that hold every file's answer
     "discover_clean": discovery.alarms_in_short,
@@ -164,6 +168,7 @@ def texts() -> dict[Path, str]:
         + robots.anchors_from_lengths_alone(kept["robot_lengths_alone"])
         + robots.anchors_held_exact(kept["robot_exact_geometry"]),
         DOCS / "real-wires.inc": discovery.papers_wires(kept["real_wires"]),
+        DOCS / "first-holds.inc": discovery.evidence_of_first_holds(kept["first_holds"]),
         DOCS / "evidence.inc": discovery.evidence_of_refits(kept["evidence"]),
         DOCS / "discover-answer.inc": claims.answer_of_discover(),
         DOCS / "discover-clean-said.inc": discovery.false_alarms(kept["discover_clean"]),

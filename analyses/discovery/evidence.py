@@ -63,8 +63,8 @@ def compared(spec: Spec, folder: Path) -> dict[str, Any] | None:
     refit = _refit(plain, name)
     if refit is None:
         return None
-    without = _integral(plain.target.problem)
-    beside = _integral(plain.problem_with(refit.effect))
+    without = log_integral(plain.target.problem)
+    beside = log_integral(plain.problem_with(refit.effect))
     if without is None or beside is None:
         return None
     by_draws = beside - without
@@ -82,7 +82,7 @@ def _refit(plain: LaplaceFit, name: str) -> Refit | None:
     return winners[0] if winners else None
 
 
-def _integral(problem: Problem) -> float | None:
+def log_integral(problem: Problem) -> float | None:
     """Log integral of a posterior density; None where the weights cannot be trusted."""
     found = witnessed(LogPosterior(problem), np.random.default_rng(0), DRAWS)
     return float(found.log_integral[0]) if found.settled[0] else None

@@ -154,6 +154,26 @@ def papers_wires(kept: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def evidence_of_first_holds(kept: dict[str, Any]) -> str:
+    """A table of what a wire's first holds say: the name given, the error on later holds, evidence by integrals."""
+    found = kept["result"]
+    models = list(next(iter(found.values()))["log_evidence"])
+    said = [_spoken([model]).replace("+", " and ") for model in models]
+    lines = [f"{run_of(kept)}; log evidence is in nats, less that of the plain model:", ""]
+    lines += table_head("first holds", "verdict", "accepted", "rms of later holds, N", *said)
+    for holds, of_these in found.items():
+        named = of_these["named"]
+        rms = f"{named['plain_rmse_N']:.2f} → {named['final_rmse_N']:.2f}"
+        evidence = [_signed(of_these["log_evidence"][model]) for model in models]
+        lines += table_row(holds, named["verdict"], _spoken(named["accepted"]), rms, *evidence)
+    return "\n".join(lines) + "\n"
+
+
+def _signed(log_bayes: float | None) -> str:
+    """A log Bayes factor, or that its integral cannot be trusted."""
+    return "not known" if log_bayes is None else f"{log_bayes:+.1f}"
+
+
 def _spoken(names: list[str]) -> str:
     """Names of effects as people say them."""
     return ", ".join(names).replace("_", " ") or "–"
