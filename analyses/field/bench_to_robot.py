@@ -162,7 +162,10 @@ def true_line(simulated: Simulated, training: Stored) -> WireDraws:
     sample = simulated.problem.samples[0]
     own = simulated.problem.parameters(simulated.theta, sample)
     line = wire_draws(training, 1)
-    return replace(line, parameters=dict(own), effects=sample.model.effects, tension_ref_N=sample.model.tension_ref_N)
+    model = sample.model
+    return replace(
+        line, parameters=dict(own), effects=model.effects, tension_ref_N=model.tension_ref_N, typical=model.typical
+    )
 
 
 def figures(stored: Stored, simulated: Simulated, folder: Path) -> list[dict[str, Any]]:

@@ -97,15 +97,22 @@ def _simulate(rig: Rig, theta: Array, members: Members, eta: Array) -> Array:
 
 
 def _material(rig: Rig, bench: Bench, theta: Array, fx: Effects, scale: float) -> Material:
-    """Creep is a strain, so B is proportional to length; `length_dependence` bends one parameter's power law."""
+    """Creep is a strain, so B is proportional to length; `length_dependence` bends one parameter's power law.
+
+    An exponent changes about the reference tension or a typical hold, where the creep stays what it is.
+    """
     first = len(MATERIAL_PARAMETERS) * rig.materials.index(bench.material)
     values = {name: theta[:, first + i] for i, name in enumerate(MATERIAL_PARAMETERS)}
     values["B"] = values["B"] * scale
+    tau_ref = rig.tau_ref.get(bench.material, 1.0)
     if fx.on("length_dependence"):
         power, which = fx["length_dependence"], fx.shape("length_dependence.which")
+        before = dict(values)
         for code, name in enumerate(("k1", "B", "N", "U")):
             values[name] = values[name] * np.where(which == code, scale**power, 1.0)
-    return Material(**values, tau_ref=rig.tau_ref.get(bench.material, 1.0))
+        values["B"] = values["B"] * tau_ref ** (before["U"] - values["U"])
+        values["k2"] = values["k2"] * rig.typical_hold_s ** (before["N"] - values["N"])
+    return Material(**values, tau_ref=tau_ref)
 
 
 def _bench(bench: Bench, m: Material, preload: Array, fx: Effects, eta: Array) -> Array:

@@ -117,12 +117,17 @@ class Rig:
     protocol: str
     benches: tuple[Bench, ...]
     wires: dict[str, Wire]
-    tau_ref: dict[str, float] = field(default_factory=dict)  # N, of `tension_dependent_rate`
+    tau_ref: dict[str, float] = field(default_factory=dict)  # N, of powers of the tension
 
     @functools.cached_property
     def materials(self) -> tuple[str, ...]:
         """Material names in order of appearance."""
         return tuple(dict.fromkeys(bench.material for bench in self.benches))
+
+    @functools.cached_property
+    def typical_hold_s(self) -> float:
+        """Median duration of all holds, s."""
+        return float(np.median([hold.duration_s for bench in self.benches for hold in bench.holds]))
 
     def reference_length(self, material: str) -> float:
         """Length (mm) at which the material's `B` is stated: that of its first bench."""

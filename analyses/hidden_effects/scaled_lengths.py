@@ -33,6 +33,17 @@ class TwoLengths(Signatures):
         """The length of which parameters that depend on it are stated."""
         return float(np.sqrt(self.parts[0].test.length_mm * self.parts[1].test.length_mm))
 
+    @cached_property
+    def typical_tension_N(self) -> float:
+        """Geometric mean of the tensions to which powers refer in the tests."""
+        return float(np.sqrt(self.parts[0].test.tension_ref_N * self.parts[1].test.tension_ref_N))
+
+    @cached_property
+    def typical_hold_s(self) -> float:
+        """Geometric mean of the median holds of the tests."""
+        first, second = (float(np.median(part.test.durations_s)) for part in self.parts)
+        return float(np.sqrt(first * second))
+
     def _each_with(self, hidden: Hidden) -> list[tuple[ScaledCase, Hidden]]:
         """Each test with the truth that it has under an effect, and what of the effect acts on it."""
         if hidden.name == "length_dependence":
@@ -41,9 +52,14 @@ class TwoLengths(Signatures):
         return [(part, hidden if acts_on in (-1, i) else Hidden()) for i, part in enumerate(self.parts)]
 
     def _at_own_length(self, part: ScaledCase, hidden: Hidden) -> ScaledCase:
+        """A test with the truth at its length; creep at the typical tension and after a typical hold is what it was."""
         name = DEPENDENT[int(hidden.shapes["which"])]
-        factor = (part.test.length_mm / self._length_mm) ** hidden.amplitude
-        return replace(part, truth=part.truth | {name: part.truth[name] * factor})
+        truth = part.truth
+        changed = truth[name] * (part.test.length_mm / self._length_mm) ** hidden.amplitude
+        bent = truth | {name: changed}
+        bent["B"] *= self.typical_tension_N ** (truth["U"] - bent["U"])
+        bent["k2"] *= self.typical_hold_s ** (truth["N"] - bent["N"])
+        return replace(part, truth=bent)
 
     def noise_free(self, hidden: Hidden = Hidden()) -> Array:  # noqa: B008 - it is frozen
         return np.concatenate([part.noise_free(own) for part, own in self._each_with(hidden)])

@@ -15,7 +15,7 @@ from analyses.hidden_effects.scaled_lengths import DEPENDENT
 from analyses.hidden_effects.scaled_sizes import PLAIN
 from wirebayes.effects import effect_named
 from wirebayes.inference.fit import seed_of
-from wirebayes.wire.effect import Amplitude, Effect
+from wirebayes.wire.effect import Amplitude, Effect, Typical
 from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import simulate
@@ -201,7 +201,8 @@ def test_a_parameter_depends_on_the_length_as_in_the_package(weights, which):
         columns = {name: np.array([value]) for name, value in part.truth.items()}
         columns |= {"length_dependence.p": np.array([0.4])}
         protocol = test.protocol()
-        model = Model(effects=(effect,), tension_ref_N=1.0, length_ref_mm=float(reference))
+        typical = Typical(pair.typical_tension_N, pair.typical_hold_s)
+        model = Model(effects=(effect,), length_ref_mm=float(reference), typical=typical)
         read.append(simulate(protocol, columns, model)[..., 0][protocol.mask])
     assert np.concatenate(read) == pytest.approx(pair.noise_free(hidden), rel=1e-9, abs=1e-11)
     assert pair.delta(hidden) > 0.0

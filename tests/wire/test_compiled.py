@@ -23,7 +23,7 @@ from wirebayes.model.build import build
 from wirebayes.model.hold_filter import Measured
 from wirebayes.model.spec import ModelSpec
 from wirebayes.wire import compiled
-from wirebayes.wire.effect import Effect, EventEffect
+from wirebayes.wire.effect import Effect, EventEffect, Typical
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import Linearised, linearise, simulate, streamed
 
@@ -58,6 +58,7 @@ models = st.builds(
     st.lists(st.sampled_from(FORMS + LAWS_OF_CREEP), max_size=4, unique_by=lambda e: e.name).map(tuple),
     st.just(3.0),
     st.sampled_from([0.0, 800.0]),
+    st.just(Typical(2.5, 90.0)),
 )
 
 
@@ -152,7 +153,7 @@ def test_filtering_a_staircase_as_it_is_computed_gives_the_same_bits_as_one_afte
 @pytest.mark.parametrize("effect", FORMS, ids=lambda e: e.key)
 def test_each_effect_moves_the_compiled_readings(effect):
     p = protocol([*ONE_WAY, 3.0, 1.0], [TIMES] * 8, warming=np.linspace(0.0, 5.0, 40).reshape(8, 5))
-    model = Model(effects=(effect,), tension_ref_N=3.0, length_ref_mm=800.0)
+    model = Model(effects=(effect,), tension_ref_N=3.0, length_ref_mm=800.0, typical=Typical(2.0, 100.0))
     theta = {name: np.array([value]) for name, value in PLAIN.items()}
     typical = {c: np.array([a.prior.ppf(0.8)]) for c, a in zip(effect.columns(), effect.amplitudes, strict=True)}
     neutral = {

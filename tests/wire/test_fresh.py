@@ -13,13 +13,14 @@ from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
 from wirebayes.robot.mechanics.wire_doubts import wire_warnings
 from wirebayes.robot.motion.creep import HoldCreep, fresh
-from wirebayes.wire.effect import Amplitude, Effect
+from wirebayes.wire.effect import Amplitude, Effect, Typical
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import simulate
 
 LONG_S = PowerLaw().long_s
 LOAD, REFERENCE, LENGTH_REF = 3.5, 2.0, 1300.0
+TYPICAL = Typical(2.5, 90.0)
 TIMES = np.array([0.0, 120.0, 3600.0, 86400.0])
 k1, B, U, k2, N = (PLAIN[name] for name in ("k1", "B", "U", "k2", "N"))
 
@@ -63,8 +64,9 @@ CREEP = {
     "steady_creep": lambda t: eq5(t) + 5e-4 * LOAD * t,
     "steady_creep@carried": lambda t: eq5(t) + 5e-4 * LOAD * t,
     "length_dependence@B": lambda t: eq5(t, B * long * LOAD**U),
-    "length_dependence@U": lambda t: eq5(t, B * LOAD ** (U * long)),
-    "length_dependence@N": lambda t: eq5(t, power=N * long),
+    # creep at 2.5 N and after 90 s is that of the length that the parameters are of
+    "length_dependence@U": lambda t: eq5(t, B * 2.5**U * (LOAD / 2.5) ** (U * long)),
+    "length_dependence@N": lambda t: eq5(t, rate=k2 * 90.0 ** (N - N * long), power=N * long),
     "logarithmic": lambda t: B * LOAD**U * np.log1p(t / 7.0) / np.log1p(LONG_S / 7.0),
     "power_law": lambda t: B * LOAD**U * (t / LONG_S) ** 0.3,
     "two_modes": lambda t: B * LOAD**U * (0.7 * (1 - np.exp(-k2 * t)) + 0.3 * (1 - np.exp(-k2 * t / 12.0))),
@@ -123,7 +125,8 @@ CASES = {key: (effects, amplitudes) for key, effects, amplitudes in _catalogue()
 
 def sample(key, law="hooke", history="saturating", length=1000.0):
     effects, amplitudes = CASES[key]
-    return FreshSample(columns(**PLAIN, **amplitudes), Model(law, history, effects, REFERENCE, LENGTH_REF), length)
+    model = Model(law, history, effects, REFERENCE, LENGTH_REF, TYPICAL)
+    return FreshSample(columns(**PLAIN, **amplitudes), model, length)
 
 
 def formula(key):

@@ -87,6 +87,7 @@ def wire_draws(stored: Stored, count: int) -> WireDraws:
         tension_range_N=(float(tensions.min()), float(tensions.max())),
         time_range_s=(0.0, longest_s),
         tension_ref_N=sample.model.tension_ref_N,
+        typical=sample.model.typical,
         doubts=stored.doubts,
     )
 

@@ -8,10 +8,11 @@ import numpy as np
 
 from wirebayes.numeric.distributions import HalfNormal, Normal, TruncatedNormal
 from wirebayes.numeric.typing import Array
-from wirebayes.wire.effect import Amplitude, Effect, HoldContext, Own
+from wirebayes.wire.effect import Amplitude, Effect, HoldContext, Own, Typical
 from wirebayes.wire.protocol import Protocol
 
-_DEPENDENT = ("k1", "B", "U", "N")  # parameters that may depend on the length; compiled code counts them in this order
+_DEPENDENT = ("k1", "B", "U", "N")  # parameters that may depend on the length
+_OF_EXPONENT = {"U": "B", "N": "k2"}  # the parameter whose unit depends on an exponent
 
 
 class StrainStiffening(Effect):
@@ -157,13 +158,16 @@ class ThermalExpansion(Effect):
 
 @dataclass(frozen=True)
 class LengthDependence(Effect):
-    """One of k1, B, U, N grows as L0^p beyond what the plain model says (B as L0, the others not at all)."""
+    """One of k1, B, U, N grows as L0^p beyond what the plain model says (B as L0, the others not at all).
+
+    Where U grows, B follows, so that the creep B τ^U at the typical tension of the tests stays as it is; where N grows,
+    k2 follows, so that the hazard k2 t^N after a typical hold does. Which of U and N is meant thus depends on no unit.
+    """
 
     which: str = "k1"
     name = "length_dependence"
     pattern = "length of the sample"
     place = "sample"
-    formula = "length_power"
     scope = "material"
     compares_lengths = True
     # either way about in proportion to the length
@@ -176,11 +180,24 @@ class LengthDependence(Effect):
         return f"{self.name}@{self.which}"
 
     @property
-    def formula_constant(self) -> float:
-        return float(_DEPENDENT.index(self.which))
+    def formula(self) -> str:  # type: ignore[override]
+        return f"{self.which}_of_length"
+
+    def formula_constant(self, typical: Typical) -> float:
+        return float(np.log(self._measured_at(typical)))
 
     def apply(self, value: Any, own: Own, hold: HoldContext) -> Any:
-        return value | {self.which: value[self.which] * (hold.length_mm / hold.length_ref_mm) ** own["p"]}
+        before = value[self.which]
+        after = before * (hold.length_mm / hold.length_ref_mm) ** own["p"]
+        changed = value | {self.which: after}
+        if self.which in _OF_EXPONENT:
+            coefficient = _OF_EXPONENT[self.which]
+            changed[coefficient] = value[coefficient] * self._measured_at(hold.typical) ** (before - after)
+        return changed
+
+    def _measured_at(self, typical: Typical) -> Any:
+        """Where the creep does not depend on the length: the tension of U, the time of N."""
+        return {"U": typical.tension_N, "N": typical.hold_s}.get(self.which, 1.0)
 
     @classmethod
     def variants(cls, protocols: Sequence[Protocol]) -> list[Effect]:

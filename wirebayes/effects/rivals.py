@@ -10,7 +10,7 @@ import numpy as np
 
 from wirebayes.numeric.distributions import LogNormal, Uniform
 from wirebayes.numeric.typing import Array
-from wirebayes.wire.effect import Amplitude, Effect, HoldContext, Own
+from wirebayes.wire.effect import Amplitude, Effect, HoldContext, Own, Typical
 
 LONG = 720.0  # typical holds: a day, where they last two minutes
 
@@ -21,8 +21,7 @@ class _WithoutPlateau(Effect):
 
     long_s: float = LONG * 120.0
 
-    @property
-    def formula_constant(self) -> float:
+    def formula_constant(self, typical: Typical) -> float:
         return self.long_s
 
     def in_units(self, tension: float, time: float) -> "_WithoutPlateau":

@@ -18,6 +18,8 @@ class TrueWire(TypedDict):
     effects: list[str]
     parameters: dict[str, float]
     tension_ref_N: float
+    typical_tension_N: float
+    typical_hold_s: float
     setting_mm: NotRequired[Numbers]
     noise_free_N: NotRequired[list[Numbers]]
     setting_N: NotRequired[Numbers]

@@ -17,7 +17,7 @@ from wirebayes.numeric.distributions import LogUniform, ours, scaled
 from wirebayes.numeric.means import geometric_mean
 from wirebayes.strict.hint import hint
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
-from wirebayes.wire.effect import Amplitude, Effect
+from wirebayes.wire.effect import Amplitude, Effect, Typical
 from wirebayes.wire.model import Model, tension_reference
 from wirebayes.wire.protocol import Control
 
@@ -61,7 +61,7 @@ def build(
     for material, members in materials.items():
         mark = f"[{material}]" if len(materials) > 1 else ""
         distributions |= _material_priors(members, effects, mark, spec, scales)
-        samples += _samples(members, [effect.referred(scales.hold_s) for effect in effects], spec)
+        samples += _samples(members, [effect.referred(scales.hold_s) for effect in effects], spec, scales)
     distributions |= _instrument_priors(experiments, effects)
     for experiment in experiments:
         mark = f"[{experiment.name}]" if several else ""
@@ -211,15 +211,16 @@ def _amplitudes(effects: Sequence[Effect]) -> list[tuple[str, Amplitude]]:
     return [pair for effect in effects for pair in zip(effect.columns(), effect.amplitudes, strict=True)]
 
 
-def _samples(members: Sequence[Experiment], effects: Sequence[Effect], spec: ModelSpec) -> list[Sample]:
+def _samples(members: Sequence[Experiment], effects: Sequence[Effect], spec: ModelSpec, scales: Scales) -> list[Sample]:
     """The experiments of one material as the likelihood sees them."""
     read = [e.tension()[e.protocol().mask] for e in members]
     tension = tension_reference(np.concatenate(read))
     length = _reference_length(members) if len(members) > 1 else 0.0
+    typical = Typical(scales.tension_N, scales.hold_s)
     out = []
     for e in members:
         present = tuple(effect for effect in effects if effect.acts_on(e.name, e.control))
-        model = Model(spec.law, spec.history, present, tension, length)
+        model = Model(spec.law, spec.history, present, tension, length, typical)
         finest = max(e.resolution, FINEST * _extent(e))
         readings = e.readings()[..., None]
         out.append(Sample(e.name, e.material, e.protocol(), readings, finest, model))

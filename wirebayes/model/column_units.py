@@ -6,6 +6,7 @@ from dataclasses import replace
 from wirebayes.model.sample import Sample
 from wirebayes.model.scales import Units
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
+from wirebayes.wire.effect import Typical
 
 _UNITS = {"k1": "N", "B": "mm", "preload": "mm"}
 _ERRORS = {"sensor_sd": READ_UNIT, "setting_sd": SET_UNIT}
@@ -69,6 +70,7 @@ def sample_in(sample: Sample, old: Units, new: Units) -> Sample:
         effects=tuple(effect.in_units(tension, time) for effect in model.effects),
         tension_ref_N=model.tension_ref_N * tension,
         length_ref_mm=model.length_ref_mm * length,
+        typical=Typical(model.typical.tension_N * tension, model.typical.hold_s * time),
     )
     return replace(
         sample,

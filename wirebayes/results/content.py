@@ -173,6 +173,8 @@ def _about(fit: Fit, members: Sequence[Sample], provenance: Mapping[str, Any]) -
         **({} if exponent is None else {LENGTH_EXPONENT: float(exponent)}),
         "effects": _listed(effect.key for effect in all_effects(members)),
         "tension_ref_N": model.tension_ref_N,
+        "typical_tension_N": model.typical.tension_N,
+        "typical_hold_s": model.typical.hold_s,
         "tension_range_N": [float(lowest), float(highest)],
         "time_range_s": [0.0, float(longest)],
         "walkers": fit.chains.z.shape[2],

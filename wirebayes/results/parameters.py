@@ -1,7 +1,6 @@
 """Parameters of a fit under the names and in the units in which they are stored."""
 
 from collections.abc import Sequence
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,8 +9,10 @@ from wirebayes.json_files.values import UNITS
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import LENGTH_EXPONENT, Sample
 from wirebayes.numeric.typing import Array
+from wirebayes.wire.away_from_bench import steady_hold
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.effect import Effect
+from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Control
 
 
@@ -46,24 +47,24 @@ def length_of_creep_amount(problem: Problem, sample: Sample | None) -> float:
 def _own(problem: Problem, theta: Array, sample: Sample) -> dict[str, Array]:
     """A sample's parameters as they are at its own length, with which it can stand alone."""
     own = problem.parameters(theta, sample)
-    return by_length(own, sample.model.effects, sample.protocol.length_mm, sample.length_ref_mm)
+    return by_length(own, sample.model, sample.protocol.length_mm, sample.length_ref_mm)
 
 
-def by_length(
-    own: dict[str, Array], effects: Sequence[Effect], length_mm: float, reference_mm: float
-) -> dict[str, Array]:
+def by_length(own: dict[str, Array], model: Model, length_mm: float, reference_mm: float) -> dict[str, Array]:
     """Parameters that depend on the length as they are at this one: alone, a sample has no other to compare with.
 
     Parameters
     ----------
     own : dict of name to (n,) array
-    effects : sequence of Effect
+    model : Model
+        Of the fit.
     length_mm, reference_mm : float
         Of the sample, and of those that it was fitted with.
     """
-    hold: Any = SimpleNamespace(length_mm=length_mm, length_ref_mm=reference_mm)
+    reference_N, typical = model.tension_ref_N, model.typical
+    hold = steady_hold(own, length_mm, reference_N, law=model.law, length_ref_mm=reference_mm, typical=typical)
     out: Any = own
-    for effect in (e for e in effects if e.compares_lengths):
+    for effect in (e for e in model.effects if e.compares_lengths):
         amplitudes = {a.name: own[c] for a, c in zip(effect.amplitudes, effect.columns(), strict=True)}
         out = effect.apply(out, amplitudes, hold)
     return dict(out)

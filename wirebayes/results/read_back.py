@@ -28,6 +28,7 @@ from wirebayes.results.netcdf import Group
 from wirebayes.results.parameters import by_length
 from wirebayes.results.stored_check import check_stored
 from wirebayes.sentences import p_in_words
+from wirebayes.wire.effect import Typical
 from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Control, Protocol
 
@@ -198,7 +199,7 @@ def _draws(posterior: Group, at: int, model: Model) -> tuple[dict[str, Array], A
     reference = float(np.exp(np.mean(np.log(lengths))))
     power = 1.0 if exponent is None else exponent
     draws = at_length(draws, model.effects, length / reference, power)
-    return by_length(draws, model.effects, length, reference), exponent
+    return by_length(draws, model, length, reference), exponent
 
 
 def _model(about: Mapping[str, Any], own_effects: Path | None, path: Path) -> Model:
@@ -210,7 +211,9 @@ def _model(about: Mapping[str, Any], own_effects: Path | None, path: Path) -> Mo
         found = f"effects of the user's own, {', '.join(foreign)}"
         raise InputError(f"{path}: found {found}, expected the file that has them, with --own-effects")
     effects = tuple(effect_named(key, known) for key in keys)
-    return Model(about["elastic_law"], about["history"], effects, float(about["tension_ref_N"]))
+    # effects in a file without these refer to 1 N and 1 s
+    typical = Typical(float(about.get("typical_tension_N", 1.0)), float(about.get("typical_hold_s", 1.0)))
+    return Model(about["elastic_law"], about["history"], effects, float(about["tension_ref_N"]), typical=typical)
 
 
 @dataclass(frozen=True)

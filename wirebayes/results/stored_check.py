@@ -79,6 +79,8 @@ def _check_numbers(sample: Sample) -> None:
         "tensions": sample.readings[..., 0],
         "resolution": sample.resolution,
         "reference tension": sample.model.tension_ref_N,
+        "typical tension": sample.model.typical.tension_N,
+        "typical hold": sample.model.typical.hold_s,
     }
     for what, value in numbers.items():
         if not _usable(np.asarray(value)):
@@ -86,8 +88,9 @@ def _check_numbers(sample: Sample) -> None:
     for what in ("times", "durations", "resolution"):
         if np.min(numbers[what]) < 0:
             raise ValueError(f"{what} below zero")
-    if protocol.length_mm <= 0 or sample.model.tension_ref_N <= 0:
-        raise ValueError("length or reference tension that is not above zero")
+    for what in ("length", "reference tension", "typical tension", "typical hold"):
+        if numbers[what] <= 0:
+            raise ValueError(f"{what} that is not above zero")
 
 
 def _usable(values: Array) -> bool:

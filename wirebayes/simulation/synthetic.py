@@ -22,7 +22,7 @@ from wirebayes.model.build import build
 from wirebayes.model.problem import Problem, with_readings
 from wirebayes.model.replicate import rounded
 from wirebayes.model.sample import Sample
-from wirebayes.model.scales import TYPICAL_K1_N, planned_scales
+from wirebayes.model.scales import TYPICAL_K1_N, planned_scales, typical_tension
 from wirebayes.model.spec import ModelSpec
 from wirebayes.numeric.frozen import frozen
 from wirebayes.numeric.means import geometric_mean
@@ -206,10 +206,9 @@ def draw(benches: Sequence[Bench], truth: Truth = Truth(), seed: int | np.random
     theta = problem.prior.rvs(1, rng)
     for name, value in truth.parameters.items():
         theta[0, _columns(problem, name, value)] = value
-    samples = tuple(_referred(problem, theta, sample) for sample in problem.samples)
-    problem = replace(problem, samples=samples)
+    problem = _referred(problem, theta)
     settings, clean, readings = [], [], []
-    for sample in samples:
+    for sample in problem.samples:
         own = problem.parameters(theta, sample)
         setting, exact, read = _read(sample, own, rng)
         _check_carried(sample, own, read)
@@ -319,15 +318,28 @@ def finite_number(key: str, text: str) -> float:
     return value
 
 
-def _referred(problem: Problem, theta: Array, sample: Sample) -> Sample:
-    """The sample with the reference tension that its own tensions have, found by a few repetitions."""
-    if sample.protocol.control == "force":
-        return sample
-    own = problem.parameters(theta, sample)
+def _referred(problem: Problem, theta: Array) -> Problem:
+    """The problem with what effects refer to as its own tensions have it, found by a few repetitions."""
     for _ in range(5):
-        reference = tension_reference(simulate(sample.protocol, own, sample.model)[sample.protocol.mask])
-        sample = replace(sample, model=replace(sample.model, tension_ref_N=reference))
-    return sample
+        tensions = [_tensions(problem, theta, sample) for sample in problem.samples]
+        typical_N = geometric_mean(typical_tension(own) for own in tensions)
+        samples = []
+        for sample in problem.samples:
+            pairs = zip(tensions, problem.samples, strict=True)
+            of_material = [own for own, other in pairs if other.material == sample.material]
+            reference = tension_reference(np.concatenate(of_material))
+            typical = sample.model.typical._replace(tension_N=typical_N)
+            samples.append(replace(sample, model=replace(sample.model, tension_ref_N=reference, typical=typical)))
+        problem = replace(problem, samples=tuple(samples))
+    return problem
+
+
+def _tensions(problem: Problem, theta: Array, sample: Sample) -> Array:
+    """Tensions of all readings of a sample, as set or without noise."""
+    protocol = sample.protocol
+    if protocol.control == "force":
+        return np.broadcast_to(protocol.setting[:, None], protocol.mask.shape)[protocol.mask]
+    return simulate(protocol, problem.parameters(theta, sample), sample.model)[protocol.mask]
 
 
 def _write_readings(path: Path, experiment: Experiment, sample: Sample) -> None:
@@ -384,6 +396,8 @@ def _truth(made: Simulated, i: int) -> TrueWire:
         "effects": [effect.key for effect in model.effects],
         "parameters": parameters,
         "tension_ref_N": model.tension_ref_N,
+        "typical_tension_N": model.typical.tension_N,
+        "typical_hold_s": model.typical.hold_s,
     }
     noise_free = []
     for row, kept in zip(made.noise_free[i], protocol.mask, strict=True):

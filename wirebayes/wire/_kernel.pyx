@@ -17,14 +17,16 @@ MOST_EFFECTS = _MOST_EFFECTS
 # In the order of `FORMULAS`; laws of time come last. A new formula also joins the list of its place in `Law`, and has its
 # own branch where that list is gone through.
 cdef enum Formula:
-    STIFFENING, TOE, TOE_OF_STRAIN, POWER, SERIES, THERMAL, LENGTH_POWER, PERMANENT, SUPERPOSITION, SECOND_MODE, FLOW, FLOW_CARRIED, RATE_POWER
-    AGEING, THRESHOLD, SLIP, BEFORE, WAIT, LATE, DELAY, DRIFT, SQUARE, TRANSIENT, SCREW, LOST_MOTION, FRICTION
+    STIFFENING, TOE, TOE_OF_STRAIN, POWER, SERIES, THERMAL, K1_OF_LENGTH, B_OF_LENGTH, U_OF_LENGTH, N_OF_LENGTH
+    PERMANENT, SUPERPOSITION, SECOND_MODE, FLOW, FLOW_CARRIED, RATE_POWER, AGEING, THRESHOLD, SLIP, BEFORE, WAIT, LATE
+    DELAY, DRIFT, SQUARE, TRANSIENT, SCREW, LOST_MOTION, FRICTION
     AT_ONCE, NOT_IN_TIME, LOGARITHMIC, POWER_OF_TIME, TWO_MODES
 
 FORMULAS = (
-    "stiffening", "toe", "toe_of_strain", "power", "series", "thermal", "length_power", "permanent", "superposition", "second_mode", "flow",
-    "flow_carried", "rate_power", "ageing", "threshold", "slip", "before", "wait", "late", "delay", "drift", "square", "transient",
-    "screw", "lost_motion", "friction", "at_once", "not_in_time", "logarithmic", "power_of_time", "two_modes",
+    "stiffening", "toe", "toe_of_strain", "power", "series", "thermal", "k1_of_length", "B_of_length", "U_of_length",
+    "N_of_length", "permanent", "superposition", "second_mode", "flow", "flow_carried", "rate_power", "ageing",
+    "threshold", "slip", "before", "wait", "late", "delay", "drift", "square", "transient", "screw", "lost_motion",
+    "friction", "at_once", "not_in_time", "logarithmic", "power_of_time", "two_modes",
 )
 
 cdef double LEAST_RATE_RATIO = 0.01  # of tension to reference, as in `wirebayes.effects.creep`
@@ -124,7 +126,7 @@ cdef struct Wire:
     Places* at
     bint own_time, timed  # creep has a rate or a time of its own in each hold; it goes on by another law than eq (5)
     int formula[_MOST_EFFECTS]
-    double number[_MOST_EFFECTS]  # the hold of an event, the parameter that depends on the length
+    double number[_MOST_EFFECTS]  # the hold of an event, the log of a typical tension or hold
     double own[_MOST_EFFECTS][3]  # amplitudes
     Dual beside[_MOST_EFFECTS]  # elongation beside the creep, as it is carried into the hold
     int clocks  # of the holds so far that are kept in mind
@@ -480,6 +482,23 @@ cdef inline double power_of_time(Wire* wire, Test test, int t) noexcept:
     return exp(wire.N * test.log_times[t]) if wire.late == 0.0 else pow(test.times[t] + wire.late, wire.N)
 
 
+cdef void follow_length(Wire* wire, Law law, int e) noexcept:
+    """Let a parameter grow with the length; creep at the typical tension and after a typical hold stays as it is."""
+    cdef double grown = exp(law.log_length_ratio * wire.own[e][0]), before
+    if law.formula[e] == K1_OF_LENGTH:
+        wire.k1 *= grown
+    elif law.formula[e] == B_OF_LENGTH:
+        wire.B *= grown
+    elif law.formula[e] == U_OF_LENGTH:
+        before = wire.U
+        wire.U *= grown
+        wire.B *= exp(law.number[e] * (before - wire.U))
+    else:
+        before = wire.N
+        wire.N *= grown
+        wire.k2 *= exp(law.number[e] * (before - wire.N))
+
+
 cdef void take(
     Wire* wire, Law law, Test test, const double[:, ::1] theta, Py_ssize_t i, double[:, ::1] shares
 ) noexcept:
@@ -489,7 +508,6 @@ cdef void take(
     the time to the power N; then, of an effect that has one, the share of its own course.
     """
     cdef int e, row = 6, a, t
-    cdef double grown
     wire.k1, wire.B, wire.U, wire.k2, wire.N = theta[0, i], theta[1, i], theta[2, i], theta[3, i], theta[4, i]
     wire.length_mm, wire.base = test.length_mm, test.length_mm + theta[5, i]
     wire.modified, wire.kept, wire.tension_ref_N = law.modified, law.kept, law.tension_ref_N
@@ -509,16 +527,8 @@ cdef void take(
             wire.late += wire.own[e][0]
         if law.formula[e] in (BEFORE, WAIT, LATE):
             wire.aged = False
-        if law.formula[e] == LENGTH_POWER:
-            grown = exp(law.log_length_ratio * wire.own[e][0])
-            if law.number[e] == 0:
-                wire.k1 *= grown
-            elif law.number[e] == 1:
-                wire.B *= grown
-            elif law.number[e] == 2:
-                wire.U *= grown
-            else:
-                wire.N *= grown
+        if K1_OF_LENGTH <= law.formula[e] <= N_OF_LENGTH:
+            follow_length(wire, law, e)
     wire.own_time = wire.own_time and not wire.timed  # another law of time has no rate
     wire.aged = wire.aged and not (wire.own_time or wire.timed)
     if wire.timed:

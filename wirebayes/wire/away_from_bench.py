@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from wirebayes.numeric.typing import Array
-from wirebayes.wire.effect import HoldContext
+from wirebayes.wire.effect import ONE_NEWTON_AND_SECOND, HoldContext, Typical
 from wirebayes.wire.laws import ElasticLaw
 
 
@@ -17,6 +17,7 @@ def steady_hold(
     *,
     law: ElasticLaw = "hooke",
     length_ref_mm: Any = None,
+    typical: Typical = ONE_NEWTON_AND_SECOND,
     index: int = 0,
     start_s: float = 0.0,
     tension_N: Array | None = None,
@@ -30,6 +31,8 @@ def steady_hold(
         All parameters of the model.
     length_mm, length_ref_mm : float or array
         The reference is the length itself when left out.
+    typical : Typical
+        Of the tests that the parameters are known from.
     law : {"hooke", "modified"}
     index, start_s : int, float
         Number of earlier holds, and the time since the first of them began.
@@ -56,4 +59,5 @@ def steady_hold(
         carried=zero if carried_mm is None else carried_mm,
         zero_mm=np.full((1, 1), 1.0) * length_mm,
         law=law,
+        typical=typical,
     )

@@ -6,7 +6,7 @@ The staircase calls effects by place and knows none by name; a user's own effect
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 
@@ -75,6 +75,19 @@ class Amplitude:
     of_each_test: bool = False
 
 
+class Typical(NamedTuple):
+    """What is typical of the tests of a fit, in N and s; in a robot a value a leg, (w, 1), where lines differ.
+
+    Effects refer to it where a number would depend on what is called a newton or a second.
+    """
+
+    tension_N: Any = 1.0
+    hold_s: Any = 1.0
+
+
+ONE_NEWTON_AND_SECOND = Typical()  # of a wire whose parameters are not known from tests
+
+
 Own = dict[str, Array]  # an effect's own amplitudes, by name
 Clock = tuple[Any, Array, Array]  # when it began, the creep that it heads for, its rate
 
@@ -101,6 +114,8 @@ class HoldContext:
     warming_K : (R, 1) array
         Zero where no temperature was logged.
     length_mm, length_ref_mm, tension_ref_N : float
+    typical : Typical
+        Tension and hold of the tests of the fit.
     theta : dict of (n,) arrays
         All parameters of the model.
     initial_tension : (1, n) array
@@ -137,6 +152,7 @@ class HoldContext:
     grown: Array = field(default_factory=lambda: np.zeros((1, 1)))
     past: list[Clock] = field(default_factory=list)
     law: ElasticLaw = "hooke"
+    typical: Typical = ONE_NEWTON_AND_SECOND
 
     def carrying(self, carried: Array) -> "HoldContext":
         """The same hold with other creep carried into it, (1, n)."""
@@ -206,9 +222,14 @@ class Effect:
         stated = next(place for place, own in enumerate(kinds) if "formula" in own)
         return bool(self.formula) and stated <= applied
 
-    @property
-    def formula_constant(self) -> float:
-        """A number that the compiled twin refers to beside the amplitudes, such as the hold of an event."""
+    def formula_constant(self, typical: Typical) -> float:
+        """A number that the compiled twin refers to beside the amplitudes, such as the hold of an event.
+
+        Parameters
+        ----------
+        typical : Typical
+            Of the model.
+        """
         return 0.0
 
     def columns(self) -> tuple[str, ...]:
@@ -340,8 +361,7 @@ class EventEffect(Effect):
     def key(self) -> str:
         return f"{self.name}@{self.test}:{self.hold}" if self.test else f"{self.name}@{self.hold}"
 
-    @property
-    def formula_constant(self) -> float:
+    def formula_constant(self, typical: Typical) -> float:
         return float(self.hold)
 
     def acts_on(self, test: str, control: Control) -> bool:

@@ -91,8 +91,15 @@ class FreshSample:
         return placed, dict(placed.change("sample", hold.theta, hold))
 
     def _context(self, theta: Theta) -> HoldContext:
-        reference = self.model.length_ref_mm or self.length_mm
-        return steady_hold(theta, self.length_mm, self.model.tension_ref_N, law=self.model.law, length_ref_mm=reference)
+        model = self.model
+        return steady_hold(
+            theta,
+            self.length_mm,
+            model.tension_ref_N,
+            law=model.law,
+            length_ref_mm=model.length_ref_mm or self.length_mm,
+            typical=model.typical,
+        )
 
     def _hold(self, tension_N: float, time_s: Array) -> HoldContext:
         theta = self._wire[1]

@@ -9,7 +9,7 @@ import numpy as np
 from wirebayes.numeric.means import geometric_mean
 from wirebayes.numeric.typing import Array
 from wirebayes.wire import laws
-from wirebayes.wire.effect import Effect
+from wirebayes.wire.effect import ONE_NEWTON_AND_SECOND, Effect, Typical
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,8 @@ class Model:
         Geometric mean of the training tensions.
     length_ref_mm : float
         Geometric mean of the samples' lengths, for effects that compare lengths; 0 means this sample's own.
+    typical : Typical
+        Tension and hold of the tests that are fitted together.
     """
 
     law: laws.ElasticLaw = "hooke"
@@ -34,6 +36,7 @@ class Model:
     effects: tuple[Effect, ...] = ()
     tension_ref_N: float = 1.0
     length_ref_mm: float = 0.0
+    typical: Typical = ONE_NEWTON_AND_SECOND
 
     @cached_property
     def compiled(self) -> tuple[tuple[str, ...], tuple[tuple[str, int, float], ...]] | None:
@@ -44,7 +47,8 @@ class Model:
         if not all(effect.has_formula for effect in self.effects):
             return None
         columns = tuple(column for effect in self.effects for column in effect.columns())
-        return columns, tuple((e.formula, len(e.amplitudes), e.formula_constant) for e in self.effects)
+        formulas = tuple((e.formula, len(e.amplitudes), e.formula_constant(self.typical)) for e in self.effects)
+        return columns, formulas
 
     def at(self, place: str) -> list[Effect]:
         """The effects at one place, in the order they compose."""

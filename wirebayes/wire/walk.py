@@ -275,6 +275,7 @@ class Walk:
             carried=_NONE,
             past=self.past,
             law=self.model.law,
+            typical=self.model.typical,
         )
 
 

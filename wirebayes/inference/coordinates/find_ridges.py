@@ -148,13 +148,21 @@ def _times(sample: Sample, durations: Array) -> dict[str, Any]:
 
 def _holds(sample: Sample, tension: Array) -> tuple[HoldContext, ...]:
     """What effects see of the holds, which begin at these tensions (H,)."""
-    length, reference = sample.length_ref_mm, sample.model.tension_ref_N
-    return tuple(
-        HoldContext(
-            **hold, length_ref_mm=length, tension_ref_N=reference, theta={}, initial_tension=np.full((1, 1), first)
+    length, reference, typical = sample.length_ref_mm, sample.model.tension_ref_N, sample.model.typical
+    contexts = []
+    for hold, first in zip(sample.protocol.holds, tension, strict=True):
+        begun = np.full((1, 1), first)
+        contexts.append(
+            HoldContext(
+                **hold,
+                length_ref_mm=length,
+                tension_ref_N=reference,
+                theta={},
+                initial_tension=begun,
+                typical=typical,
+            )
         )
-        for hold, first in zip(sample.protocol.holds, tension, strict=True)
-    )
+    return tuple(contexts)
 
 
 def _seen(sample: Sample, durations: Array) -> tuple[Array, Array]:

@@ -18,7 +18,7 @@ from wirebayes.robot.mechanics.statics import geometry
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.wire import laws
 from wirebayes.wire.away_from_bench import steady_hold
-from wirebayes.wire.effect import OF_THE_BENCH, Effect, Placed
+from wirebayes.wire.effect import OF_THE_BENCH, ONE_NEWTON_AND_SECOND, Effect, Placed, Typical
 
 CORE = ("k1", "B", "U", "k2", "N")
 DIFFER = ("k1", "B", "k2")  # what a stated spread lets differ from specimen to specimen
@@ -43,6 +43,8 @@ class WireDraws:
     tension_range_N, time_range_s : (low, high) or None
         What was tested; outside, the answer is an extrapolation and is said to be one.
     tension_ref_N : float
+    typical : Typical
+        Tension and hold of the tests that it was fitted to.
     name : str
         Of the wire in the robot's file that it is; "default" are the legs that name none.
     others : mapping of name to WireDraws
@@ -64,6 +66,7 @@ class WireDraws:
     tension_range_N: tuple[float, float] | None = None
     time_range_s: tuple[float, float] | None = None
     tension_ref_N: float = 1.0
+    typical: Typical = ONE_NEWTON_AND_SECOND
     name: str = "default"
     others: Mapping[str, "WireDraws"] = field(default_factory=dict)
     spread: Mapping[str, Floats] = field(default_factory=dict)
@@ -161,7 +164,8 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
         exponents = [one.parameters.get(LENGTH_EXPONENT, np.ones(1)) for one in lines]
         theta["B"] = theta["B"] * longer ** (_of_legs(exponents, line.count) - 1.0)
     reference = _reference_tension(line, lines)
-    hold = steady_hold(theta, length * longer, reference, length_ref_mm=length)
+    typical = _typical(line, lines)
+    hold = steady_hold(theta, length * longer, reference, length_ref_mm=length, typical=typical)
     effects = _united(line)
     at_sample = Placed(_at_sample(effects), theta)
     theta = dict(at_sample.change("sample", theta, hold))
@@ -212,6 +216,13 @@ def _reference_tension(line: WireDraws, lines: Sequence[WireDraws]) -> Any:
     if any(one.tension_ref_N != line.tension_ref_N for one in line.others.values()):
         return _by_leg([one.tension_ref_N for one in lines])
     return line.tension_ref_N
+
+
+def _typical(line: WireDraws, lines: Sequence[WireDraws]) -> Typical:
+    """What is typical of the tests of every leg's line: two numbers, or a leg's own where lines differ."""
+    if any(one.typical != line.typical for one in line.others.values()):
+        return Typical(*(_by_leg([one.typical[i] for one in lines]) for i in range(2)))
+    return line.typical
 
 
 def _of_legs(values: Sequence[Floats | float], n: int) -> Floats:
