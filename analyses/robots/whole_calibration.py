@@ -31,7 +31,6 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.tensions import nearest
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration import (
-    answer,
     descent,
     equations,
     holds_creep,
@@ -43,6 +42,7 @@ from wirebayes.robot.self_calibration import (
 )
 from wirebayes.robot.self_calibration.identified import identified
 from wirebayes.robot.self_calibration.linearisation import linearised
+from wirebayes.robot.self_calibration.search import StatedPoses
 from wirebayes.robot.self_calibration.seeds import best
 from wirebayes.robot.self_calibration.summary import Moment, summarised
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
@@ -249,12 +249,10 @@ def exact(size: int, seed: int) -> Iterator[dict[str, Any]]:
         errors = replace(one.told.errors, exit_m=0.0, joint_m=asked.encoder * robot.span_m)
         readings = (one.holds.tension_N / log.tension_sd_N).ravel()
         with np.errstate(all="ignore"):
-            if asked.stops == FEW:
-                found, _ = answer.lengths_report(robot, one.told.prior, log, readings, seed, 0)
-            else:
-                found = whole_answer.calibration_report(
-                    robot, one.told.prior, errors, log, readings, seed, False, 0
-                ).content
+            poses = StatedPoses.REQUESTED if asked.stops == FEW else StatedPoses.MEASURED
+            found = whole_answer.calibration_report(
+                robot, one.told.prior, errors, log, readings, seed, poses, 0
+            ).content
             power = _power(one, errors, _unplaced(log) if asked.stops == FEW else log) if asked.anchor else 0.0
         yield {
             "kind": asked.kind,
@@ -390,7 +388,7 @@ def sensors(size: int, seed: int) -> Iterator[dict[str, Any]]:
         with np.errstate(all="ignore"):
             told = one.told
             found = whole_answer.calibration_report(
-                robot, told.prior, told.errors, log, readings, seed, False, 0
+                robot, told.prior, told.errors, log, readings, seed, visits=0
             ).content
         said = found["sensors_at_fault"]
         yield {

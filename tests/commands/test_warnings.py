@@ -88,7 +88,7 @@ WARNED = {  # what must be warned of, so that an empty list is no answer
     "pose": "not-converged",
     "unheld": "unheld",
     "trajectory": "not-converged",
-    "calibrate": "not-converged",
+    "calibrate": "misfit",
     "export": "left-out",
 }
 

@@ -13,6 +13,7 @@ from wirebayes.commands.calibrate import calibrate
 from wirebayes.commands.wires import robot_of
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.self_calibration import descent, open_where, residuals, session_file, whole
+from wirebayes.robot.self_calibration.search import StatedPoses
 from wirebayes.robot.self_calibration.session import LengthPrior
 from wirebayes.robot.self_calibration.unknowns import StatedErrors
 from wirebayes.robot.self_calibration.whole_answer import calibration_report
@@ -38,7 +39,7 @@ def _calibrated(holds=None, errors=ROUGH, changed=lambda log: log, **options):
     read = session_file.parse_session(table, robot, 5.0, 1e-3)
     with np.errstate(all="ignore"):  # as the command has it
         return calibration_report(
-            robot, LengthPrior(LINE, 0.05, 0.05), errors, *read, requests=True, visits=1, **options
+            robot, LengthPrior(LINE, 0.05, 0.05), errors, *read, poses=StatedPoses.EITHER, visits=1, **options
         )
 
 
@@ -199,4 +200,4 @@ def test_lengths_alone_say_how_far_they_have_come(fitted, session_csv, tmp_path)
         "linear-7", session_csv[0], fitted, next_poses=1, output=tmp_path / "out",
         progress=lambda name, done, total: said.append((name, done / total)),
     )  # fmt: skip
-    assert dict(said) == {"lengths": 1.0, "without creep": 1.0}
+    assert dict(said) == {"start 1": 1.0, "without creep": 1.0}

@@ -293,7 +293,7 @@ def test_a_calibration_that_does_not_converge_says_so_and_gives_no_joint_values(
     for _ in range(2):  # a finished folder says it again
         assert main(arguments) == 0
         (line,) = capsys.readouterr().err.splitlines()  # at one hold no sensor is blamed
-        assert line.startswith("warning: not converged with the creep model")
+        assert line.startswith("warning: not converged: do not use these values")
     content = read_json(out / "calibration.json")
     assert not content["with_creep_model"]["converged"]
     assert content["joint_values_for_home_m"] is None and content["pose_now"] is None

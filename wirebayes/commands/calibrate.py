@@ -31,8 +31,8 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, typical_spread
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.self_calibration import session_file, whole_answer
-from wirebayes.robot.self_calibration.answer import lengths_report
 from wirebayes.robot.self_calibration.calibrated import Calibrated, from_dict, to_dict
+from wirebayes.robot.self_calibration.search import StatedPoses
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.unknowns import StatedErrors
 from wirebayes.strict.columns import columns_table
@@ -220,14 +220,22 @@ class _GivenErrors:
             "--joint-sd": self.joint_mm,
         }
 
-    def stated(self, robot: Robot, session: Session) -> StatedErrors | None:
-        """Errors of geometry and poses in metres; None where the lengths alone are to be estimated."""
-        exact = not (self.anchor_mm or self.platform_mm or self.drum_percent)
+    @property
+    def exact(self) -> bool:
+        """Whether the robot is as its file says, but for its lengths."""
+        return not (self.anchor_mm or self.platform_mm or self.drum_percent)
+
+    def poses(self, session: Session) -> StatedPoses:
+        """What the poses of a session are."""
         stated = self.pose_mm or self.joint_mm is not None
-        poses_known = np.isfinite(session.position_m).all() and np.isfinite(session.rotation).all()
-        if exact and not stated and poses_known and session.read.any():
-            return None
-        joint_m = 0.0 if exact else None
+        all_known = np.isfinite(session.position_m).all() and np.isfinite(session.rotation).all()
+        if self.exact and not stated and all_known and session.read.any():
+            return StatedPoses.REQUESTED
+        return StatedPoses.EITHER if self.pose_mm is None else StatedPoses.MEASURED
+
+    def stated(self, robot: Robot) -> StatedErrors:
+        """Errors of geometry, poses and joint values in metres."""
+        joint_m = 0.0 if self.exact else None
         if self.joint_mm is not None:
             joint_m = 1e-3 * self.joint_mm
         platform_mm = self.platform_mm if robot.degrees == 6 else 0.0  # of a point, they are errors of the exit points
@@ -269,15 +277,11 @@ def _estimated(
     visits: int,
     progress: Progress,
 ) -> tuple[CalibrateJson, Calibrated, Robot | None]:
-    """The content of ``calibration.json``, the posterior, and the whole robot where more than lengths is estimated."""
-    errors = given.stated(robot, read[0])
+    """The content of ``calibration.json``, the posterior, and the robot where more than lengths is estimated."""
+    errors, poses = given.stated(robot), given.poses(read[0])
     with computing(), np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
-        if errors is None:
-            found, known = lengths_report(robot, prior, *read, seed, visits, progress)
-            return found, known, None
-        requests = given.pose_mm is None
-        whole = whole_answer.calibration_report(robot, prior, errors, *read, seed, requests, visits, progress)
-        return whole.content, whole.known, whole.robot
+        whole = whole_answer.calibration_report(robot, prior, errors, *read, seed, poses, visits, progress)
+    return whole.content, whole.known, None if given.exact else whole.robot
 
 
 def _write(folder: Path, robot: Robot, found: CalibrateJson, known: Calibrated, of: BelongsTo) -> None:

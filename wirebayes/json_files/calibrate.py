@@ -157,11 +157,16 @@ class SensorsAtFault(TypedDict):
     p_none: float
 
 
-class CalibrateJson(CalibratedPoses, Observed, NamedEstimates, Warned):
+class JointErrors(TypedDict):
+    """How far lengths are from joint values, and the error of these; None where joint values are exact."""
+
+    length_rms_mm: float | None
+    joint_sd_mm: float | None
+
+
+class CalibrateJson(CalibratedPoses, Observed, NamedEstimates, JointErrors, Warned):
     """The whole file."""
 
-    length_rms_mm: float | None  # None, and no errors of next poses, where the lengths alone were estimated
-    joint_sd_mm: float | None
     next_pose_sd_mm: Numbers
 
     version: int

@@ -15,6 +15,7 @@ from wirebayes.sentences import short
 
 _DETERMINED = 0.5  # of the standard deviation before
 _FLAT = 1e-6  # of the span
+_PART = 0.2  # of a combination: smaller parts are not named
 _AXES = ("x", "y", "the vertical")
 _SAYS = {
     "moved along x": "the whole robot may be moved along x",
@@ -55,12 +56,18 @@ class Identified:
         Independent combinations of geometry and references that they determine, and all.
     combinations : list of Combination
     sentences : list of str
+    weakest : (w,) array
+        Unit combination of the reference lengths that is known least.
+    weakest_sd_m : float
+        Its standard deviation.
     """
 
     determined: int
     of: int
     combinations: list[Combination]
     sentences: list[str]
+    weakest: Floats
+    weakest_sd_m: float
 
 
 def identified(found: Whole) -> Identified:
@@ -79,7 +86,31 @@ def identified(found: Whole) -> Identified:
     sentences += _of_references(found)
     size = _sizes(found)
     count = int((np.sqrt(np.maximum(size, 0.0)) < _DETERMINED).sum())
-    return Identified(count, len(size), combinations, sentences)
+    return Identified(count, len(size), combinations, sentences, *_weakest(found))
+
+
+def weakest_in_words(weakest: Floats, sd_m: float) -> str:
+    """A combination of reference lengths and how well it is known.
+
+    Parameters
+    ----------
+    weakest : (w,) array
+    sd_m : float
+    """
+    parts = []
+    for i in np.argsort(-np.abs(weakest)):
+        if abs(weakest[i]) > _PART:
+            parts.append(f"{weakest[i]:+.2f} of wire {i + 1}")
+    return f"{', '.join(parts)}, known to {short(1e3 * sd_m, 2)} mm"
+
+
+def _weakest(found: Whole) -> tuple[Floats, float]:
+    """The unit combination ``(w,)`` of the reference lengths that is known least, its largest part positive; its sd."""
+    at = found.unknowns.references
+    values, vectors = np.linalg.eigh(found.covariance[at, at])
+    direction = vectors[:, -1]
+    largest = direction[np.argmax(np.abs(direction))]
+    return direction * np.sign(largest), found.unknowns.prior.reference_sd_m * float(np.sqrt(max(values[-1], 0.0)))
 
 
 def _of_references(found: Whole) -> list[str]:

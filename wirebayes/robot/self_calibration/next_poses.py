@@ -13,7 +13,7 @@ from wirebayes.numeric.linear_algebra import inv, solve
 from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.motion import inverse
+from wirebayes.robot.motion import hanging, inverse
 from wirebayes.robot.self_calibration.equations import Equations, Holds, State, moved
 from wirebayes.robot.self_calibration.linearisation import linearised
 from wirebayes.robot.self_calibration.posterior import Whole
@@ -88,7 +88,7 @@ class _Candidates:
 
 def _candidates(robot: Robot, rng: np.random.Generator) -> _Candidates:
     x = rng.uniform(robot.lower_m, robot.upper_m, (_CANDIDATES, 3))
-    R = np.broadcast_to(turns.matrix(robot.home_rotation_rad), (_CANDIDATES, 3, 3))
+    R = hanging.orientations(robot, x, turns.matrix(robot.home_rotation_rad))
     tau = inverse.tensions(robot, x, R)
     good = np.isfinite(tau).all(1)
     return _Candidates(x[good], R[good], tau[good])

@@ -28,17 +28,29 @@ def trust(found: Whole) -> float:
     """Probability of residuals and estimates this far from model and priors: `trust.joint_test`.
 
     A hold's own unknowns have no prior, so each of them costs a degree of freedom. Geometry and references are tested
-    alone too. Where nobody read tensions, two more tests share the level: tensions far outside the range that the
-    robot's file allows, or an error of the loops far above what is usual, show that lengths and geometry contradict
-    each other.
+    alone too. Where nobody read tensions, and lengths do not tell them, two more tests share the level: tensions far
+    outside the range that the robot's file allows, or an error of the loops far above what is usual, show that lengths
+    and geometry contradict each other.
     """
     p = _joint_probability(found)
     unread = _unread(found)
-    if not unread.any():
+    if not unread.any() or lengths_tell(found.unknowns, ~unread):
         return p
     free = unread.sum() - _taken_up(found)
     tensions = float(chdtrc(max(free, 1.0), _beyond_usual(found)))
     return min(1.0, 2.0 * p, 4.0 * tensions, 4.0 * _usual_noise(found))  # p has the better of two tests times two
+
+
+def lengths_tell(unknowns: Unknowns, read: Bools) -> bool:
+    """Whether tensions that nobody read follow from joint values that are exact, and these from tensions that were.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    read : (p, w) bool array
+        Which tensions were.
+    """
+    return unknowns.errors.joint_m == 0 and bool(read.any())
 
 
 def _joint_probability(found: Whole) -> float:
@@ -74,14 +86,20 @@ def _unread(found: Whole) -> Bools:
 
 
 def misfit(found: Whole) -> float:
-    """Mean squared residual of what was read or stated, the balance aside."""
-    e = found.equations
+    """Mean squared residual of what was read or stated with an error, the balance aside."""
+    e, errors = found.equations, found.unknowns.errors
+    exact = {"balance"}
+    if errors.joint_m == 0:
+        exact.add("loop")
+    if errors.pose_m == 0:
+        exact.add("pose")
     read = []
     for name, part in e.rows.items():
-        if name != "balance":
+        if name not in exact:
             known = e.known[:, part]
             read.append(e.residual[:, part][known])
-    return float(np.mean(np.concatenate(read) ** 2))
+    residuals = np.concatenate(read)
+    return float(np.mean(residuals**2)) if residuals.size else 0.0
 
 
 def length_rms_m(found: Whole) -> float:

@@ -1,6 +1,7 @@
 """The search for a whole robot: stated poses as they are or as requests, joint values as exact or not, sensors."""
 
 from dataclasses import dataclass, replace
+from enum import Enum
 
 import numpy as np
 from scipy.special import chdtr, fdtrc
@@ -8,8 +9,8 @@ from scipy.special import chdtr, fdtrc
 from wirebayes.progress import Progress
 from wirebayes.robot.self_calibration.equations import Holds
 from wirebayes.robot.self_calibration.posterior import Whole
-from wirebayes.robot.self_calibration.residuals import lost, trust, usual_joint
-from wirebayes.robot.self_calibration.seeds import best
+from wirebayes.robot.self_calibration.residuals import lost, misfit, trust, usual_joint
+from wirebayes.robot.self_calibration.seeds import best, near_requests
 from wirebayes.robot.self_calibration.sensors import Suspects, suspects
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.unknowns import Unknowns
@@ -17,8 +18,17 @@ from wirebayes.robot.self_calibration.whole import estimate, progress_of
 
 _RATHER = 3.0  # times smaller errors of loops or balance, before stated poses are taken for requests
 _WELL, _CHANCE = 0.1, 1e-4  # of the standard deviation before; of estimates that near to their prior's mean
+_GROSS = 1e4  # mean squared residual: of readings that are a hundred standard errors off no joint value is the reason
 _NO_DEGREES = 1e-9  # of freedom: what loops that always close are left with
 _UNSEEN = 1e-3  # of the weight: as long as the balance fails by less, no sensor is looked at
+
+
+class StatedPoses(Enum):
+    """What the poses of a session are."""
+
+    MEASURED = "where the robot was"
+    REQUESTED = "where it was sent"
+    EITHER = "measured, unless they contradict the readings or only repeat them"
 
 
 @dataclass(frozen=True)
@@ -37,7 +47,7 @@ class Searched:
     inexact : bool
         Joint values that were taken as exact are not.
     requested : bool
-        Stated poses were taken for requests.
+        Stated poses turned out to be requests.
     too_near : bool
         Estimates lie nearer to the robot's file than its stated errors allow, and without the stated poses there is
         no answer.
@@ -56,7 +66,7 @@ def searched(
     unknowns: Unknowns,
     holds: Holds,
     rng: np.random.Generator,
-    requests: bool,
+    poses: StatedPoses,
     progress: Progress,
 ) -> Searched:
     """Find a whole robot from a session.
@@ -67,33 +77,37 @@ def searched(
     holds : Holds
     rng : numpy Generator
         Draws the starts.
-    requests : bool
-        Stated poses may turn out to be requests, which the robot followed as well as it could.
+    poses : StatedPoses
     progress : function of name, done and total
     """
-    found = best(unknowns, holds, rng, progress)
+    about = None
+    if poses is StatedPoses.REQUESTED:
+        about, holds = near_requests(unknowns, holds), _without_poses(holds)
+    found = best(unknowns, holds, rng, progress, about=about)
     too_good = bool(holds.placed.any()) and _too_good(found)
-    found, holds, requested = _rather_requests(found, holds, too_good, requests, progress)
+    doubted = poses is StatedPoses.EITHER
+    found, holds, requested = _rather_requests(found, holds, too_good, doubted, progress)
     p, at_fault = trust(found), None
     if (p < SIGNIFICANT or found.noise.balance > _UNSEEN) and not lost(found):
         at_fault = suspects(found, holds, progress_of(progress, "sensors"))
     inexact = unknowns.errors.joint_m == 0 and not (found.converged and p >= SIGNIFICANT)
-    if inexact:  # how far from exact the joint values are tells more than that there is no answer
+    if inexact and misfit(found) < _GROSS:
+        # how far from exact the joint values are tells more than that there is no answer
         rough = replace(unknowns, errors=replace(unknowns.errors, joint_m=None))
-        found = best(rough, holds, rng, progress, "rough start")
+        found = best(rough, holds, rng, progress, "rough start", about)
     return Searched(found, holds, p, at_fault, inexact, requested, too_good and not requested)
 
 
 def _rather_requests(
-    found: Whole, holds: Holds, too_good: bool, allowed: bool, progress: Progress
+    found: Whole, holds: Holds, too_good: bool, doubted: bool, progress: Progress
 ) -> tuple[Whole, Holds, bool]:
     """What is found without the poses, where they are commands or contradict the joint values: they were requests.
 
     An answer is not given up for a search that found none.
     """
-    if not holds.placed.any() or not (too_good or (allowed and found.unknowns.errors.pose_m == 0)):
+    if not holds.placed.any() or not (too_good or (doubted and found.unknowns.errors.pose_m == 0)):
         return found, holds, False
-    blind = replace(holds, session=holds.session.without_poses())
+    blind = _without_poses(holds)
     state = replace(found.state, white=np.zeros_like(found.state.white))
     other = estimate(found.unknowns, blind, state, progress_of(progress, "poses as requests"))
     if found.converged and not other.converged:
@@ -102,6 +116,10 @@ def _rather_requests(
     if too_good or (other.converged and better and trust(other) >= SIGNIFICANT):
         return other, blind, True
     return found, holds, False
+
+
+def _without_poses(holds: Holds) -> Holds:
+    return replace(holds, session=holds.session.without_poses())
 
 
 def _steadier(found: Whole, other: Whole) -> bool:

@@ -1,6 +1,6 @@
 """Starts for the calibration of a whole robot: poses from lengths, as far as these tell them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -26,6 +26,9 @@ from wirebayes.robot.self_calibration.whole import estimate, progress_of, with_l
 _TRIALS, _STEPS = 24, 25  # places a search begins from, and its steps: mirror images and far corners are among them
 _WEAK = 1e-2  # pull towards the workspace and the home orientation, beside lengths
 _SMALL = 1e-3  # N of imbalance for which a tension may be 1 N smaller: decides among those that carry alike
+# A request whose wires would be off by so much of the span, beside so many errors of a reference length, is of another
+# pose: the hold's place is looked for like one of which nothing is known.
+_ASTRAY, _OFF = 0.05, 5.0
 _OTHERS = 2  # further starts, where the first does not explain the readings
 
 
@@ -193,6 +196,7 @@ def best(
     rng: Generator,
     progress: Progress = silent,
     called: str = "start",
+    about: Holds | None = None,
 ) -> Whole:
     """The posterior from the likeliest of several starts: about the file's geometry, and about others near it.
 
@@ -204,14 +208,16 @@ def best(
     progress : function of name, done and total
     called : str
         What progress calls a start, before its number.
+    about : Holds, optional
+        The same with poses that are no readings, but near which the first search begins.
     """
     unknowns = with_levels(unknowns, holds)
 
-    def from_start(white: Floats, number: int) -> Whole:
+    def from_start(white: Floats, number: int, near: Holds = holds) -> Whole:
         watched = progress_of(progress, f"{called} {number}")
-        return estimate(unknowns, holds, seed(unknowns, holds, white, rng), watched)
+        return estimate(unknowns, holds, seed(unknowns, near, white, rng), watched)
 
-    found = from_start(np.zeros(unknowns.count), 1)
+    found = from_start(np.zeros(unknowns.count), 1, about or holds)
     for k in range(_OTHERS):
         if found.converged and trust(found) >= SIGNIFICANT:
             break
@@ -225,6 +231,27 @@ def best(
         if other.converged > found.converged or other.evidence > found.evidence:
             found = other
     return found
+
+
+def near_requests(unknowns: Unknowns, holds: Holds) -> Holds:
+    """The holds with those stated poses alone that the joint values lead near, so that a search can begin there.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    holds : Holds
+        With the poses that the robot was sent to.
+    """
+    robot, session = unknowns.robot, holds.session
+    bare, offset = inverse.lengths(robot, session.joint_m)
+    shape = statics.geometry(robot, session.position_m.T, batch_last(session.rotation))
+    gap = statics.stretched(robot, shape, offset.T).T - bare
+    largest = np.abs(gap / robot.lines).max(1)
+    near = largest < _ASTRAY * robot.span_m + _OFF * unknowns.prior.reference_sd_m
+    lost = session.without_poses()
+    position = chosen_rows(near, session.position_m, lost.position_m)
+    rotation = chosen_rows(near, session.rotation, lost.rotation)
+    return replace(holds, session=replace(session, position_m=position, rotation=rotation))
 
 
 def _near_file(unknowns: Unknowns, rng: Generator) -> Floats:

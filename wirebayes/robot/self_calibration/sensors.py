@@ -17,6 +17,7 @@ from wirebayes.progress import ShareDone, shares_of
 from wirebayes.result_warnings import Notice
 from wirebayes.robot.self_calibration.equations import Holds
 from wirebayes.robot.self_calibration.posterior import Whole
+from wirebayes.robot.self_calibration.residuals import misfit, trust
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, chance
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 from wirebayes.robot.self_calibration.whole import estimate
@@ -123,8 +124,18 @@ def suspects(found: Whole, holds: Holds, progress: ShareDone = lambda share: Non
         still = np.abs(bias - before) < _STILL * sd
         if other.converged or still.all():
             progress(1.0)
-            return weighed(bias, covariance, widest)
+            return None if _explain_little(found, other) else weighed(bias, covariance, widest)
     return None
+
+
+def _explain_little(found: Whole, other: Whole) -> bool:
+    """Whether errors of all sensors together leave more of what contradicts stated errors than one may leave.
+
+    Where the error of the joint values is estimated, it has taken up what contradicts.
+    """
+    if found.unknowns.errors.joint_m is None or trust(other) >= SIGNIFICANT:
+        return False
+    return misfit(other) > (1 - MOST) * misfit(found)
 
 
 def _with_biases(found: Whole, sd_N: float) -> Unknowns:

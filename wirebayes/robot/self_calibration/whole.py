@@ -21,6 +21,7 @@ from wirebayes.robot.self_calibration.posterior import Whole, gaussian_posterior
 from wirebayes.robot.self_calibration.residuals import (
     joint_error,
     length_rms_m,
+    lengths_tell,
     lost,
     lost_m,
     most_open_m,
@@ -57,6 +58,7 @@ _EASINGS = 16  # quarterings that lead from a tenth of the span to a micrometre
 # Of the range that a robot's file allows: tensions that nobody read lie anywhere in it, so this is their standard
 # deviation about a level that the holds share. The level may be off by half the range, and does not average out.
 _UNREAD, _LEVEL = 12**-0.5, 0.5
+_ANYTHING = 1e6  # times as much, where nothing is thought of such tensions: a stiff wire's gap is a large negative one
 
 
 def with_levels(unknowns: Unknowns, holds: Holds) -> Unknowns:
@@ -67,7 +69,8 @@ def with_levels(unknowns: Unknowns, holds: Holds) -> Unknowns:
     unknowns : Unknowns
     holds : Holds
     """
-    if np.isfinite(holds.tension_N).all():
+    read = np.isfinite(holds.tension_N)
+    if read.all() or lengths_tell(unknowns, read):
         return unknowns
     rule = unknowns.robot.rule
     level_N = _LEVEL * (rule.highest_N - rule.lowest_N)
@@ -226,9 +229,13 @@ def _before_reading(unknowns: Unknowns, holds: Holds) -> Noise:
     low, high = rule.lowest_N, rule.highest_N
     usual = 0.5 * (low + high) if rule.choice == "middle" else low
     finest = low
-    if np.isfinite(holds.tension_N).any():
+    read = np.isfinite(holds.tension_N)
+    if read.any():
         finest = min(holds.session.tension_sd_N, low)
-    return Noise(joint_error(unknowns, holds), FRICTIONLESS, _UNREAD * (high - low), usual, _SOFT * finest)
+    pull_N = _UNREAD * (high - low)
+    if lengths_tell(unknowns, read):
+        pull_N *= _ANYTHING
+    return Noise(joint_error(unknowns, holds), FRICTIONLESS, pull_N, usual, _SOFT * finest)
 
 
 def _next_noise(noise: Noise, rounds: list[tuple[Floats, Floats]]) -> Noise:

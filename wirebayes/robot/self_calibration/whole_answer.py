@@ -11,6 +11,7 @@ from wirebayes.json_files.calibrate import (
     EstimatedLengths,
     EstimatedPoses,
     IdentifiedJson,
+    JointErrors,
     ObservabilityJson,
 )
 from wirebayes.numeric.typing import Floats
@@ -24,20 +25,20 @@ from wirebayes.robot.motion import home, inverse, plausible
 from wirebayes.robot.self_calibration import sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated
 from wirebayes.robot.self_calibration.equations import Holds, moved
-from wirebayes.robot.self_calibration.identified import Identified, identified
+from wirebayes.robot.self_calibration.identified import Identified, identified, weakest_in_words
 from wirebayes.robot.self_calibration.mistaken import column_notices, tension_notices
 from wirebayes.robot.self_calibration.next_poses import NextPoses, next_poses
-from wirebayes.robot.self_calibration.open_where import most_open, odd_hold
+from wirebayes.robot.self_calibration.open_where import contradicted_requests, most_open, odd_hold
 from wirebayes.robot.self_calibration.posterior import Whole
 from wirebayes.robot.self_calibration.report_parts import estimated_lengths, pose_and_home, with_biases
 from wirebayes.robot.self_calibration.residuals import length_rms_m, lost, misfit, trust
-from wirebayes.robot.self_calibration.search import Searched, searched
+from wirebayes.robot.self_calibration.search import Searched, StatedPoses, searched
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import Summary, summarised
-from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval_about, unlearnt, unlikely
+from wirebayes.robot.self_calibration.trust import SIGNIFICANT, chance, interval_about, unlearnt, unlikely
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
 from wirebayes.robot.self_calibration.whole import estimate, progress_of
-from wirebayes.sentences import short
+from wirebayes.sentences import number, short
 
 _UNEVEN = 0.05  # of the weight: balance that fails by more shows that something else held the platform
 
@@ -78,7 +79,7 @@ def calibration_report(
     session: Session,
     readings: Floats,
     seed: int = 0,
-    requests: bool = False,
+    poses: StatedPoses = StatedPoses.MEASURED,
     visits: int = 5,
     progress: Progress = silent,
 ) -> WholeAnswer:
@@ -96,18 +97,18 @@ def calibration_report(
     readings : (r,) array
         Standardised, as `predicted.PredictedSession.readings`.
     seed : int
-    requests : bool
-        Stated poses may turn out to be requests, which the robot followed as well as it could.
+    poses : StatedPoses
     visits : int
         Number of poses to propose.
     progress : function of name, done and total
     """
     rng = np.random.default_rng(seed)
     holds = holds_of(robot, session, readings)
-    search = searched(Unknowns(robot, prior, errors), holds, rng, requests, progress)
+    search = searched(Unknowns(robot, prior, errors), holds, rng, poses, progress)
     found, holds, seen = search.found, search.holds, identified(search.found)
     ahead = next_poses(found, holds, visits, rng) if found.converged else NextPoses(np.empty((0, 3)), np.empty(0))
-    s, verdict = summarised(found), _Verdict(search, seen)
+    requested = session if poses is StatedPoses.REQUESTED else None
+    s, verdict = summarised(found), _Verdict(search, seen, contradicted_requests(found, requested))
     content: CalibrateJson = {
         "version": 2,
         "robot": robot.name,
@@ -120,15 +121,14 @@ def calibration_report(
         "references_m": interval_about(*s.reference_m),
         "poses": _poses(s, session),
         "misfit": misfit(found),
-        "length_rms_mm": 1e3 * length_rms_m(found),
-        "joint_sd_mm": 1e3 * found.noise.joint_m,
+        **_joint_errors(found),
         "identified": _identified(seen),
         "usable": verdict.usable,
         "sensors_at_fault": sensors.sensors_json(search.at_fault),
-        "with_creep_model": _lengths(found, s),
+        "with_creep_model": _lengths(found, s, search.p),
         "by_hooke_alone": _by_hooke_alone(found, holds, prior, progress),
         **_now(robot, found, s, verdict.usable),
-        "observability": _observability(seen),
+        "observability": _observability(seen, errors),
         "next_positions_m": ahead.position_m,
         "next_pose_sd_mm": 1e3 * ahead.pose_sd_m,
         "warnings": to_json(
@@ -150,6 +150,7 @@ class _Verdict:
 
     search: Searched
     seen: Identified
+    contradicted: list[Notice]
 
     @property
     def learnt(self) -> bool:
@@ -167,7 +168,7 @@ class _Verdict:
         search = self.search
         biased = search.at_fault is not None and search.at_fault.p_none < SIGNIFICANT
         explained = search.p >= SIGNIFICANT and not (search.inexact or search.too_near or self.uneven or biased)
-        return bool(search.found.converged and self.learnt and explained)
+        return bool(search.found.converged and self.learnt and explained and not self.contradicted)
 
 
 def _prior(prior: LengthPrior, errors: StatedErrors, session: Session) -> CalibrationPrior:
@@ -187,11 +188,11 @@ def _poses(s: Summary, session: Session) -> EstimatedPoses:
     return {"hold": np.asarray(session.numbers, float).tolist(), **interval_about(mean, sd, half)}
 
 
-def _lengths(found: Whole, s: Summary) -> EstimatedLengths:
+def _lengths(found: Whole, s: Summary, p_joint: float) -> EstimatedLengths:
     return estimated_lengths(
         converged=found.converged,
         misfit=misfit(found),
-        p_joint=trust(found),
+        p_joint=p_joint,
         length_m=s.length_m,
         creep=s.strain,
         reference_m=s.reference_m,
@@ -203,16 +204,26 @@ def _by_hooke_alone(found: Whole, holds: Holds, prior: LengthPrior, progress: Pr
     """What would be found if the wires did not creep."""
     without = replace(found.unknowns, prior=replace(prior, creeps=False))
     plain = estimate(without, holds, found.state, progress_of(progress, "without creep"))
-    return _lengths(plain, summarised(plain))
+    return _lengths(plain, summarised(plain), trust(plain))
 
 
-def _observability(seen: Identified) -> ObservabilityJson:
+def _observability(seen: Identified, errors: StatedErrors) -> ObservabilityJson:
+    what = "points and lengths" if errors.exit_m or errors.platform_m else "lengths"
+    determined = f"The readings determine {seen.determined} of {seen.of} combinations of {what}"
+    least = weakest_in_words(seen.weakest, seen.weakest_sd_m)
     return {
         "rank": seen.determined,
         "of": seen.of,
-        "weakest_combination": [],
-        "sentence": f"The readings determine {seen.determined} of {seen.of} combinations of points and references.",
+        "weakest_combination": seen.weakest,
+        "sentence": f"{determined}; of the lengths least of all {least}.",
     }
+
+
+def _joint_errors(found: Whole) -> JointErrors:
+    """How far the lengths are from the joint values; None where these are exact."""
+    if found.unknowns.errors.joint_m == 0:
+        return {"length_rms_mm": None, "joint_sd_mm": None}
+    return {"length_rms_mm": 1e3 * length_rms_m(found), "joint_sd_mm": 1e3 * found.noise.joint_m}
 
 
 def _identified(seen: Identified) -> IdentifiedJson:
@@ -252,7 +263,7 @@ def _joint_values_for_home(robot: Robot, found: Whole, s: Summary) -> Floats:
 def _warnings(verdict: _Verdict) -> list[Notice]:
     search, found = verdict.search, verdict.search.found
     robot = found.unknowns.robot
-    out = [*plausible.robot_notices(robot), *home.home_notices(robot)]
+    out = [*verdict.contradicted, *plausible.robot_notices(robot), *home.home_notices(robot)]
     if not found.converged:
         text = f"not converged: do not use these values; {_not_converged(found, search.holds.session)}"
         out.append(Notice("not-converged", text))
@@ -273,14 +284,10 @@ def _warnings(verdict: _Verdict) -> list[Notice]:
         )
         out.append(Notice("misfit", text))
     if found.converged and search.inexact:
-        text = (
-            f"geometry, taken as exact, and joint values agree to {short(1e3 * found.noise.joint_m, 2)} mm only: do "
-            "not use these values; give --anchor-sd, or --joint-sd if the joint values are that uncertain"
-        )
-        out.append(Notice("misfit", text))
+        out.append(Notice("misfit", _inexact(search)))
     elif found.converged and search.p < SIGNIFICANT:
         out.append(unlikely(search.p))
-    if found.converged and not verdict.learnt:
+    if found.converged and not (verdict.learnt or search.inexact):  # contradictions teach nothing
         out.append(unlearnt(1e3 * found.unknowns.prior.reference_sd_m))
     if verdict.uneven and not lost(found):  # else nothing is known of the tensions
         text = (
@@ -289,6 +296,22 @@ def _warnings(verdict: _Verdict) -> list[Notice]:
         )
         out.append(Notice("misfit", text))
     return out
+
+
+def _inexact(search: Searched) -> str:
+    """What to do where joint values that are taken as exact contradict the rest."""
+    found = search.found
+    if found.unknowns.errors.joint_m == 0:  # by more than an error of theirs explains
+        off = number(misfit(found) ** 0.5)
+        return (
+            f"the readings are {off} standard errors (root mean square) from what robot and wires allow: do not use "
+            "these values; check their units, the order of the columns, --tension-sd, and the robot's file"
+        )
+    return (
+        f"geometry, taken as exact, and joint values agree to {short(1e3 * found.noise.joint_m, 2)} mm only (joint "
+        f"test, {chance(search.p)}): do not use these values; give --anchor-sd, or --joint-sd if the joint values "
+        "are that uncertain, and check --wires, the readings' units and signs, --tension-sd and --reference-sd"
+    )
 
 
 def _columns(search: Searched) -> list[Notice]:
