@@ -17,7 +17,7 @@ from wirebayes.wire.staircase import linearise, simulate, streamed
 
 WIRE = {"k1": 2000.0, "B": 0.1, "U": 0.5, "k2": 0.02, "N": 0.8, "sensor_sd": 0.02, "setting_sd": 0.05}
 TEST = protocol([0.0, 0.3], [[0.0, 20.0, 60.0]] * 2)
-ERRORS = np.linspace(-6.0, 6.0, 801)  # in standard deviations: what is integrated over
+FAR, APART = 6.0, 0.06  # standard deviations of the setting: how far is integrated, and at most this far apart
 
 
 def columns(theta, n=1):
@@ -42,9 +42,16 @@ def found(theta, readings, p=TEST):
     return likelihoods.chain(line, seen).log_likelihood.sum()
 
 
+def grid(theta, p):
+    """Setting errors in standard deviations; from one to the next a reading changes by less than its own error."""
+    error_N = theta["setting_sd"] * theta["k1"] / p.length_mm
+    apart = min(APART, 0.75 * theta["sensor_sd"] / error_N)
+    return np.linspace(-FAR, FAR, round(2.0 * FAR / apart) + 1)
+
+
 def integral(theta, readings, p=TEST, mask=None):
     """Log density of readings, summed over a grid of the setting errors of two holds."""
-    one, other = np.meshgrid(ERRORS, ERRORS, indexing="ij")
+    one, other = np.meshgrid(grid(theta, p), grid(theta, p), indexing="ij")
     errors = np.stack([one.ravel(), other.ravel()])
     log_weight = -0.5 * (errors**2).sum(axis=0)
     clean = simulate(p, columns(theta, errors.shape[1]), Model(), errors * theta["setting_sd"])

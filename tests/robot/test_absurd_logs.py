@@ -60,10 +60,10 @@ def test_a_log_that_fits_nothing_ends_early_and_says_how_far_off_it_is(monkeypat
 
 def test_the_share_of_a_part_never_falls(monkeypatch):
     """Where exact joint values fit nothing, all starts come again with rough ones."""
-    monkeypatch.setattr(whole, "_ROUNDS", 4)
+    monkeypatch.setattr(whole, "_ROUNDS", 3)
     said = {}
     _calibrated(
-        6, replace(ROUGH, joint_m=0.0), progress=lambda name, done, total: said.setdefault(name, []).append(done)
+        4, replace(ROUGH, joint_m=0.0), progress=lambda name, done, total: said.setdefault(name, []).append(done)
     )
     assert {"start 1", "rough start 1"} <= said.keys()
     assert all(shares == sorted(shares) and shares.count(1.0) == 1 for shares in said.values())

@@ -1,6 +1,7 @@
 """Creep within holds, of prediction and of the estimator, against finer steps and another integration."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -58,10 +59,16 @@ def _finely(robot, prior, session, values):
     return np.array(tension), np.array(length), tuple(np.array(part) for part in zip(*poses, strict=True))
 
 
+@cache
+def _drawn_and_followed(kind, seed):
+    """A drawn session and how it goes by fine steps, once for all tests of it."""
+    session = _drawn(kind, seed)
+    return session, _finely(*session)
+
+
 @pytest.mark.parametrize(("kind", "seed"), STRONG, ids=lambda v: str(v))
 def test_predicted_readings_are_those_of_much_finer_steps(kind, seed):
-    robot, prior, session, values = _drawn(kind, seed)
-    tension, length, _ = _finely(robot, prior, session, values)
+    (robot, prior, session, values), (tension, length, _) = _drawn_and_followed(kind, seed)
     real = predict_session(robot, prior, session, values)
     read = real.readings[0].reshape(tension.shape)
     np.testing.assert_allclose(read, tension / session.tension_sd_N, atol=0.05)
@@ -71,8 +78,7 @@ def test_predicted_readings_are_those_of_much_finer_steps(kind, seed):
 
 @pytest.mark.parametrize(("kind", "seed"), STRONG, ids=lambda v: str(v))
 def test_the_estimators_creep_closes_the_loops_of_much_finer_steps(kind, seed):
-    robot, prior, session, values = _drawn(kind, seed)
-    tension, length, pose = _finely(robot, prior, session, values)
+    (robot, prior, session, values), (tension, length, pose) = _drawn_and_followed(kind, seed)
     stiff = prior.wires(robot, values)[0].theta["k1"].T
     pull_N = _latent(robot, session, pose, tension, length, stiff)
     left_m = _loops(robot, prior, Holds(session, pull_N), values, pose)

@@ -25,9 +25,12 @@ from wirebayes.simulation.synthetic import Bench, Truth
 pytestmark = pytest.mark.statistical
 SMALL = Policy(ensembles=4, walkers=48, ess=300.0, rounds=3, round_draws=2304, most_rounds=4, block=24, most_steps=240)
 HASTY = Policy(walkers=64, ess=20_000.0, rounds=1, round_draws=256, most_rounds=1)  # one round teaches next to nothing
-RUNS = 24
-# |t| of this size in any of 16 moments happens by chance once in three hundred tests (23 degrees of freedom)
-LIMIT = 4.5
+RUNS, FEW = 24, 10  # few where the draws of one are many, or far off
+
+
+def limit(runs=RUNS):
+    """The |t| that any of 16 moments exceeds by chance once in three hundred tests."""
+    return stats.t.isf(0.5 / 300.0 / 16.0, runs - 1)
 
 
 def worst(target_of, policy=SMALL, runs=RUNS):
@@ -57,7 +60,7 @@ def worst(target_of, policy=SMALL, runs=RUNS):
 @pytest.mark.parametrize("name", ["gaussian", "two_modes"])
 def test_moments_are_right_within_monte_carlo_error(name):
     t, ratio = worst(TARGETS[name])
-    assert t < LIMIT
+    assert t < limit()
     assert 0.6 < ratio < 1.7
 
 
@@ -77,7 +80,7 @@ def test_moments_are_right_over_many_runs_with_the_policy_s_own_numbers(name):
     policy = Policy(most_steps=800)
     t, ratio = worst(TARGETS[name], policy, runs=60)
     print(f"{name}: largest |t| {t:.2f}, spread over promised {ratio:.2f}")
-    assert t < LIMIT
+    assert t < limit()
     assert 0.6 < ratio < 1.5
 
 
@@ -88,14 +91,14 @@ def test_moments_are_right_in_as_many_dimensions_as_samples_fitted_together_have
     policy = Policy(most_steps=800)
     t, ratio = worst(lambda: gaussian(d), policy)
     print(f"{d} dimensions: largest |t| {t:.2f}, spread over promised {ratio:.2f}")
-    assert t < LIMIT
+    assert t < limit()
     assert 0.6 < ratio < 1.7
 
 
 def test_a_proposal_that_proves_poor_is_learned_once_more_before_draws_are_kept(monkeypatch):
     again = sample_posterior(TARGETS["two_modes"](), 3, HASTY)
-    t, ratio = worst(gaussian, HASTY)
-    assert t < LIMIT
+    t, ratio = worst(gaussian, HASTY, FEW)
+    assert t < limit(FEW)
     assert 0.6 < ratio < 1.7
     monkeypatch.setattr(stop_rule, "worth_a_new_start", lambda state: False)
     monkeypatch.setattr(stop_rule, "worth_refining", lambda state, policy: False)
@@ -115,8 +118,8 @@ class _ForgetsTheProposal(moves.PoolMove):
 
 def test_a_sampler_that_forgets_the_proposal_s_density_fails(monkeypatch):
     monkeypatch.setattr(sampler_state, "PoolMove", _ForgetsTheProposal)
-    t, _ = worst(gaussian)
-    assert t > LIMIT
+    t, _ = worst(gaussian, runs=FEW)
+    assert t > limit(FEW)
 
 
 @pytest.mark.slow
@@ -132,7 +135,7 @@ def test_adapting_while_draws_are_kept_would_be_noticed(monkeypatch):
     monkeypatch.setattr(kept, "more", wrong)
     monkeypatch.setattr(kept, "block_steps", lambda state, policy: 1 if state.kept.z else 2)
     t, _ = worst(gaussian, Policy(**{**SMALL.__dict__, "most_steps": 24, "ess": 1e9}))
-    assert t > LIMIT
+    assert t > limit()
 
 
 def funnels(neck, runs):
@@ -173,8 +176,8 @@ def test_without_witness_excess_and_tails_the_sampler_believes_a_funnel_without_
 @pytest.mark.parametrize(
     ("centres", "runs"),
     [
-        (corners(), 2),
-        (grid(), 2),
+        (corners(), 1),
+        (grid(), 1),
         *(pytest.param(c, 20, marks=pytest.mark.slow) for c in (corners(), grid(), grid(20.0))),
         pytest.param(
             corners(20.0),
