@@ -240,7 +240,7 @@ def test_a_robot_is_turned_by_the_keyboard_and_followed_in_time(pages, tab):
     turned = tab.run(points)
     assert turned != first
     tab.run("document.querySelector('figure.view input').focus()")
-    assert tab.run("document.querySelector('figure.view output').textContent") == "600 s"
+    assert tab.run("document.querySelector('figure.view output').textContent") == "10 min"
     tab.press("Home", 36)
     assert tab.run("document.querySelector('figure.view output').textContent") == "0 s"
     assert tab.run(points) != turned
