@@ -236,3 +236,11 @@ def test_creep_over_more_decades_than_a_test_reads_is_said_to_want_a_power_law(d
     assert (in_words in said) == named
     assert posterior_checks.endless({"N": np.full(9, 0.1), "k2": np.ones(9)}, {"N": np.full(9, 0.1)}) == ""  # stated
     assert posterior_checks.endless({}, prior) == ""
+
+
+def test_a_stated_preload_that_leaves_a_pulling_wire_slack_is_the_first_to_be_said(simulated):
+    readings = simulated.problem.samples[0].readings[..., 0]
+    experiment = replace(with_tensions(Bench().experiment(), readings), priors={"preload": {"fixed": -4.5}})
+    problem = build([experiment])
+    found = posterior_checks.posterior_warnings(fit_problem(problem, 1, policy=HASTY), problem.samples[0])
+    assert "(preload_mm) leaves the wire slack in holds 1, 2, 3 and 4" in found[0].text

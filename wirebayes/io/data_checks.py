@@ -13,6 +13,7 @@ from wirebayes.io.checked_test import CheckedTest
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.isolated_readings import ISOLATED, outlier
 from wirebayes.io.readings import READ, times_run_on
+from wirebayes.io.slack_by_preload import slack_by_preload
 from wirebayes.io.zero_shifts import slack_below, zero_shift
 from wirebayes.numeric.typing import Floats
 from wirebayes.result_warnings import Notice
@@ -69,8 +70,11 @@ def warnings(protocol: Protocol, values: Floats, resolution: float) -> list[Noti
 
 def of_experiment(experiment: Experiment) -> list[Notice]:
     """The warnings of one test."""
-    found = warnings(experiment.protocol(), experiment.readings(), experiment.resolution)
-    return [*found, *one_setting(experiment.protocol(), set(experiment.priors))]
+    protocol, readings = experiment.protocol(), experiment.readings()
+    preload_mm = experiment.priors.get("preload", {}).get("fixed")
+    found = slack_by_preload(protocol, readings, experiment.resolution, preload_mm)
+    found += warnings(protocol, readings, experiment.resolution)
+    return [*found, *one_setting(protocol, set(experiment.priors))]
 
 
 def one_setting(protocol: Protocol, stated: Set[str]) -> list[Notice]:

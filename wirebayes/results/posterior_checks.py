@@ -11,6 +11,7 @@ from wirebayes.effects.unknown import Discrepancy
 from wirebayes.inference.fit import Fit
 from wirebayes.io import data_checks
 from wirebayes.io.checked_test import CheckedTest
+from wirebayes.io.slack_by_preload import slack_by_preload
 from wirebayes.io.zero_shifts import slack_below
 from wirebayes.model.build import FINEST
 from wirebayes.model.problem import Problem
@@ -53,10 +54,14 @@ def posterior_warnings(fit: Fit, sample: Sample) -> list[Notice]:
     own = problem.parameters(fit.flat, sample)
     drawn = problem.prior.rvs(4000, np.random.default_rng(0))
     prior = problem.parameters(drawn, sample)
-    of_readings = data_checks.warnings(sample.protocol, sample.readings[..., 0], sample.resolution)
+    protocol, readings = sample.protocol, sample.readings[..., 0]
+    of_readings = data_checks.warnings(protocol, readings, sample.resolution)
     if problem.likelihood == "chain":
+        preload_mm = problem.prior.fixed.get(problem.column("preload", sample))
+        of_preload = slack_by_preload(protocol, readings, sample.resolution, preload_mm)
+        of_readings = [*of_preload, *of_readings]
         stated = {name for name in ("k1", "preload") if problem.column(name, sample) in problem.stated}
-        of_readings += data_checks.one_setting(sample.protocol, stated)
+        of_readings += data_checks.one_setting(protocol, stated)
     of_prior = leaning(problem.prior, fit.flat, _columns_of(problem, sample))
     return [*of_readings, *of_posterior(own, prior, sample), *of_prior]
 
