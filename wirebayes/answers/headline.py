@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from wirebayes.answers.creep import creep_as_long_as_held, lengths_in_words
+from wirebayes.answers.robot import stays_in_words
 from wirebayes.answers.terminal import MOST_OUTLIERS, missing_in
 from wirebayes.answers.verdict import control_judged, is_more_than_chance, verdict_in_words, what_it_is
 from wirebayes.json_files.batch import BatchJson, Row
@@ -13,7 +14,7 @@ from wirebayes.json_files.check import CheckedExperiment
 from wirebayes.json_files.comparison import ComparedModels, Difference
 from wirebayes.json_files.discovery import ExperimentFindings
 from wirebayes.json_files.plan import PlanJson
-from wirebayes.json_files.pose import PoseJson, known_at_the_end
+from wirebayes.json_files.pose import PoseJson, known_at_the_end, stays
 from wirebayes.json_files.read_units import error_grows, read_value, unit_read
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.values import Band, Statistics
@@ -275,6 +276,8 @@ def pose_in_a_sentence(found: PoseJson) -> str:
     known = [drift for drift in found["drift"] if known_at_the_end(drift)]
     if not known:
         return f"No draw of the wires holds {found['robot']} to the end."
+    if all(map(stays, found["drift"])):
+        return f"{found['robot']}: {stays_in_words(found)}."
     drift = known[-1]
     moved = _at_the_end(drift["distance_mm"], "mm")
     tilt = drift["tilt_deg"]

@@ -5,7 +5,7 @@ from typing import cast
 import numpy as np
 
 from wirebayes.json_files.calibrate import CalibrateJson
-from wirebayes.json_files.pose import PoseJson, known_at_the_end
+from wirebayes.json_files.pose import PoseJson, known_at_the_end, stays
 from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.json_files.values import Band, MeanAndSd
 from wirebayes.sentences import coordinates, lasting, short, specimens_are
@@ -22,6 +22,8 @@ def of_pose(found: PoseJson | PoseHistoryJson) -> list[str]:
         lines.append(f"{robot}: {pose['plane']['sentence']}")
     measured = "history" in found and cast(PoseHistoryJson, found)["history"]["kind"] == "measured"
     moved = "is away from where it is meant to be" if measured else "has drifted"
+    if all(stays(drift) for drift in pose["drift"]):
+        return [*lines, f"{robot}: {stays_in_words(pose)}"]
     drifts = []
     for drift in found["drift"]:
         if not known_at_the_end(drift):
@@ -34,6 +36,13 @@ def of_pose(found: PoseJson | PoseHistoryJson) -> list[str]:
     if not drifts:
         drifts.append(f"{robot}: no draw of the wires could be solved")
     return lines + drifts
+
+
+def stays_in_words(found: PoseJson) -> str:
+    """A clause about a platform that creep does not move, up to the last time that was asked for."""
+    until = lasting(found["drift"][0]["times_s"][-1])
+    why = "friction holds it, or its wires do not creep" if "plane" in found else "its wires do not creep"
+    return f"within {until} the platform does not drift, for {why}"
 
 
 def _band_at_the_end(band: Band) -> str:

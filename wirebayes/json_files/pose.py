@@ -325,6 +325,12 @@ class PoseJson(RobotOnWires):
     workspace: NotRequired[Workspace | None]
 
 
+def stays(drift: Drift) -> bool:
+    """Whether no draw of the wires moves the platform at any time: wires that do not creep."""
+    means = drift["distance_mm"]["mean"], drift["rotation_deg"]["mean"]
+    return all(mean is not None and all(value == 0 for value in mean) for mean in means)
+
+
 def known_at_the_end(drift: Drift) -> bool:
     """Whether any draw holds the platform at the last time."""
     middle = drift["distance_mm"]["q50"]

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import ClassVar, cast
 
 from wirebayes.answers.robot import of_pose
-from wirebayes.json_files.pose import PoseJson, known_at_the_end
+from wirebayes.json_files.pose import PoseJson, known_at_the_end, stays
 from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.robot.mechanics.wires_used import specimens_in_words
 from wirebayes.sentences import coordinates, lasting
@@ -90,6 +90,8 @@ def _after_pose(found: PoseJson | PoseHistoryJson, folder: Path, given: Given) -
     if lost or not found.get("feasible", True):
         return "another pose or payload, or other bounds of the tension in the robot's file"
     calibrate = f"wirebayes calibrate {given.file} READINGS.csv{given.wires}"
+    if all(map(stays, cast(PoseJson, found)["drift"])):
+        return f"{calibrate}  (finds the lengths of its wires)"
     return f"{calibrate}  (when it drifts too far)"
 
 

@@ -4,8 +4,9 @@ import math
 from pathlib import Path
 
 from wirebayes.answers.headline import pose_in_a_sentence
+from wirebayes.answers.robot import stays_in_words
 from wirebayes.io.run_folder import read_json
-from wirebayes.json_files.pose import Drift, EquilibriaJson, PoseJson, SliceOfWorkspace, TimeWithin, Tolerances
+from wirebayes.json_files.pose import Drift, EquilibriaJson, PoseJson, SliceOfWorkspace, TimeWithin, Tolerances, stays
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -112,6 +113,8 @@ def _next(pose: PoseJson) -> str:
         return "Next: [plane] in the robot's file, if a table or a rail carries the platform; else another pose."
     if not pose["feasible"]:
         return "Next: another pose or payload, or other bounds of the tension in the robot's file."
+    if all(map(stays, pose["drift"])):
+        return "Next: wirebayes calibrate finds the wires' lengths."
     return "Next: wirebayes calibrate finds the wires' lengths again, once the drift is more than you allow."
 
 
@@ -158,8 +161,12 @@ def _answers(pose: PoseJson) -> list[Points]:
 
 def _moved(pose: PoseJson) -> list[str]:
     """How far the platform has moved in the end."""
+    entries = pose.get("drift", [])
+    if entries and all(map(stays, entries)):
+        answer = stays_in_words(pose)
+        return [f"{answer[0].upper()}{answer[1:]}."]
     known = []
-    for entry in pose.get("drift", []):
+    for entry in entries:
         if entry["distance_mm"]["q50"]:
             low, middle, high = at_row(entry["distance_mm"], -1)
             moved = quantity(middle, low, high, "mm")
@@ -181,9 +188,12 @@ def _within_limits(pose: PoseJson) -> list[str]:
         known.append(f"It moves {limits} within {time} with a probability of {chance}, if {alike}.")
     space = pose.get("workspace")
     if space:
-        moved = quantity(space["q50_drift_mm"], space["q05_drift_mm"], space["q95_drift_mm"], "mm")
+        how_far = "it does not move"
+        if space["q95_drift_mm"]:
+            moved = quantity(space["q50_drift_mm"], space["q05_drift_mm"], space["q95_drift_mm"], "mm")
+            how_far = f"it moves by {moved}"
         known.append(
-            f"Anywhere in the workspace it moves by {moved} within {time}, and stays within both "
+            f"Anywhere in the workspace {how_far} within {time}, and stays within both "
             f"limits with a probability of {percent(space['probability'])}."
         )
     return known

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from wirebayes.answers.robot import of_pose
+from wirebayes.json_files.pose import stays
 from wirebayes.json_files.pose_history import HistoryOfRobot, HistoryReadings, PoseHistoryJson
 from wirebayes.json_files.values import Band, Numbers
 from wirebayes.report.blocks import (
@@ -60,7 +61,9 @@ def pose_history_page(folder: Path, configuration: Configuration, pose: PoseHist
     """
     measured = pose["history"]["kind"] == "measured"
     about = "by its measured joint values" if measured else "on its commanded way"
-    lead = f"{of_pose(pose)[-1]}, {about}; the interval holds 90 %."
+    still = pose["feasible"] and stays(pose["drift"][0])
+    condition = "" if still else f", {about}; the interval holds 90 %"
+    lead = f"{of_pose(pose)[-1]}{condition}."
     title = f"Robot {pose['robot']}"
     if not pose["feasible"]:
         return Page(title, lead, [Section("Summary", before_the_answer(pose))])
@@ -157,12 +160,14 @@ def _began(history: HistoryOfRobot) -> str:
 def _answers(pose: PoseHistoryJson) -> list[Points]:
     (drift,) = pose["drift"]
     time = number(float(drift["times_s"][-1]))
-    known = [f"After {time} s the platform is {_last(drift['distance_mm'])} mm {_from_where(pose['history'])}."]
+    away = _last(drift["distance_mm"], _SMALLEST_MM)
+    known = [f"After {time} s the platform is {away} mm {_from_where(pose['history'])}."]
     if pose.get("rotation_vector_rad"):
         known.append(f"It has turned by {_last(drift['rotation_deg'])} degrees.")
     left = pose["corrections"]["left_mm"]
     if left["q50"] and left["q50"][-1] is not None:
-        known.append(f"Corrected joint values (corrections.csv) bring it back; they leave {_last(left)} mm.")
+        still_away = _last(left, _SMALLEST_MM)
+        known.append(f"Corrected joint values (corrections.csv) bring it back; they leave {still_away} mm.")
     return [Points("What is known", known), Points("What is not known", _unknown(pose))]
 
 
@@ -187,8 +192,11 @@ def _unknown(pose: PoseHistoryJson) -> list[str]:
     return unknown
 
 
-def _last(band: Band) -> str:
+def _last(band: Band, least: float = 0.0) -> str:
+    """The last value of a band, with its interval; nothing where no draw is above the least that is shown."""
     low, middle, high = at_row(band, -1)
+    if high is not None and high <= least:
+        return "0"
     return f"{number(middle)} ({span(low, high)})"
 
 

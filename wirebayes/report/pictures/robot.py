@@ -89,20 +89,24 @@ def scene(robot: Robot, position_m: Floats, rotation: Floats, course: Course) ->
     view = scene_points(robot, position_m, rotation, course)
     enlarged = view["exaggeration"]
     here = np.asarray(view["platform"])
-    there = here + enlarged * (view["drifted"][-1] - here)
+    drifts = len(view["drifted"]) > 0
+    there = here + enlarged * (view["drifted"][-1] - here) if drifts else here
     figure = Figure(figsize=(6.0, 5.2))
     axes: Any = figure.add_axes((0.0, 0.06, 0.92, 0.86), projection="3d")
     for i in range(robot.legs):
         _draw_wire(axes, robot, i, here[i], color=QUIET, lw=1.0)
         _draw_wire(axes, robot, i, there[i], color=HOLD, lw=0.7, ls=":")
     _draw_platform(axes, robot, here, CHAIN, "commanded")
-    _draw_platform(axes, robot, there, HOLD, "drifted")
+    if drifts:
+        _draw_platform(axes, robot, there, HOLD, "drifted")
     exits = robot.exit_m
     axes.scatter(*exits.T, color=INK, s=14, label="exit points")
     every_point = np.concatenate([exits, here, there])
     size_m = np.ptp(exits, axis=0).max()
     _label_axes(axes, every_point, position_m, size_m)
-    head = f"{verbatim(robot.name)}: mean drift after {course.times_s[-1]:g} s, enlarged {enlarged:g} times"
+    head = f"{verbatim(robot.name)}: no drift"
+    if drifts:
+        head = f"{verbatim(robot.name)}: mean drift after {course.times_s[-1]:g} s, enlarged {enlarged:g} times"
     figure.text(0.02, 0.95, head, fontsize=10.5, color=INK)
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="lower center", ncols=3, frameon=False, fontsize=8.5)
@@ -152,11 +156,14 @@ def scene_points(robot: Robot, position_m: Floats, rotation: Floats, course: Cou
     found = course.found
     position = course.position_m[found].mean(0)
     turned = course.rotation[found].mean(0)
+    points = still_points(robot, position_m, rotation)
+    if not np.any(course.position_m[found] - position_m) and not np.any(course.rotation[found] - rotation):
+        points["tensions_N"] = np.median(course.tension_N[found][:, :1], axis=0)
+        return points
     shown = evenly(len(position), _MOST_TIMES)
     last_drift = position[-1] - position_m
     platform = np.einsum("tij,wj->twi", turned[shown], robot.platform_m)
     tensions = course.tension_N[found][:, shown]
-    points = still_points(robot, position_m, rotation)
     points["drifted"] = position[shown, None] + platform
     points["times"] = [lasting(time) for time in course.times_s[shown]]
     points["tensions_N"] = np.median(tensions, axis=0)
@@ -249,8 +256,24 @@ def in_time(drifts: Sequence[Drift], key: Distance, label: str, title: str) -> F
         name = f"specimens differ by {100 * spread:g} %" if spread else "identical specimens"
         _banded(axes, entry["times_s"], entry[key], colour, name)
     _since(axes, drifts[0]["times_s"])
+    told_if_nothing(axes, [entry[key] for entry in drifts])
     legend_below(figure, axes)
     return figure
+
+
+def told_if_nothing(axes: Any, bands: Sequence[Band]) -> None:
+    """Draw bands that are zero throughout as such, on an axis to 1, and say it.
+
+    Parameters
+    ----------
+    axes : Axes
+        On which they are drawn, from zero on.
+    bands : sequence of dict
+    """
+    drawn = [band["q95"] for band in bands if band["q95"] is not None]
+    if drawn and not np.any(np.nan_to_num(np.array(drawn, float))):
+        axes.set_ylim(-0.02, 1)  # the line shows above the axis
+        axes.text(0.5, 0.5, "zero at all times", ha="center", transform=axes.transAxes, color=INK)
 
 
 def error_in_time(errors: Sequence[ControllerError]) -> Figure:

@@ -16,11 +16,12 @@ from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.report.drawn import svg
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel
-from wirebayes.report.pictures.robot import Distance, platform_edges, round_factor
+from wirebayes.report.pictures.robot import Distance, platform_edges, round_factor, told_if_nothing
 from wirebayes.robot.history.answer import HistoryAnswer
 from wirebayes.robot.history.follow import Track
 from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.motion.drift import ROUNDING
 from wirebayes.sentences import lasting, unit_of_time
 
 _COLOURS = (CHAIN, HOLD, "#5d8c4a", "#c59a2e", "#7b5ea7", "#4a9aa8", "#8a6d5c", "#b0708e", "#6b7780")
@@ -72,6 +73,7 @@ def banded(drift: DriftOverTime, key: Distance, label: str, title: str, history:
     figure, axes = panel(f"time, {unit}", label, title)
     _band(axes, np.divide(drift["times_s"], size), _ends_of(drift[key]), CHAIN, "median and 90 % of the draws")
     axes.set_ylim(bottom=0)
+    told_if_nothing(axes, [drift[key]])
     _in_time(figure, axes, history)
     return figure
 
@@ -145,7 +147,9 @@ def _enlarged(robot: Robot, shift_m: Floats) -> float:
     size = float(np.ptp(robot.exit_m, axis=0).max())
     distances = np.linalg.norm(shift_m, axis=1)
     largest = float(np.nanmax(distances, initial=0.0))
-    return round_factor(0.07 * size / max(largest, 1e-12))
+    if largest < ROUNDING * size:
+        return 1.0
+    return round_factor(0.07 * size / largest)
 
 
 def _mean_pose(track: Track, rows: Indices) -> tuple[Floats, Floats]:

@@ -79,9 +79,11 @@ def _slices(position_m: Floats, value: Floats, plane: _Plane, headline: str) -> 
 def _ends(values: Floats) -> tuple[float, float]:
     """Least and largest of what is known; infinite where nothing is."""
     known = values[np.isfinite(values)]
-    least = np.min(known, initial=np.inf)
-    largest = np.max(known, initial=-np.inf)
-    return float(least), float(largest)
+    least = float(np.min(known, initial=np.inf))
+    largest = float(np.max(known, initial=-np.inf))
+    if least == largest == 0.0:
+        largest = 1.0  # of wires that do not creep: colours of nothing, on a scale that does not magnify it
+    return least, largest
 
 
 def _headed(name: str, title: str) -> str:

@@ -104,7 +104,7 @@ def history_report(
     course = _course(history, found, rows)
     content |= {
         "history": content["history"] | {"holds": int(found.track.hold[-1]) + 1},
-        "drift": [_drift(course, to, rows, errors.spread)],
+        "drift": [_drift(robot, course, to, rows, errors.spread)],
         "position_m": _bands(course.position_m),
         "rotation_vector_rad": _bands(rotation_vectors(course.rotation)) if robot.degrees == 6 else None,
         "corrections": {
@@ -260,8 +260,10 @@ def _moved(course: Course, to: Target, rows: Indices) -> tuple[Floats, Floats, F
     return shift, angle, tilt
 
 
-def _drift(course: Course, to: Target, rows: Indices, spread: float) -> DriftOverTime:
+def _drift(robot: Robot, course: Course, to: Target, rows: Indices, spread: float) -> DriftOverTime:
     shift, angle, tilt = _moved(course, to, rows)
+    nothing = drifting.are_rounding(shift, angle, robot.span_m)
+    shift[nothing], angle[nothing], tilt[nothing] = 0.0, 0.0, 0.0
     return {
         "specimen_spread": spread,
         "times_s": course.times_s,

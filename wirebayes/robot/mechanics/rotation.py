@@ -55,7 +55,16 @@ def tilt(rotation: Floats, commanded: Floats | None = None) -> Floats:
         The orientation whose normal counts; default: upright, and the normal is compared with the vertical.
     """
     turned = rotation if commanded is None else np.swapaxes(commanded, -1, -2) @ rotation
-    return np.asarray(np.arctan2(np.hypot(turned[..., 0, 2], turned[..., 1, 2]), turned[..., 2, 2]))
+    angle = np.arctan2(np.hypot(turned[..., 0, 2], turned[..., 1, 2]), turned[..., 2, 2])
+    return without_rounding(np.asarray(angle))
+
+
+def without_rounding(angle_rad: Floats) -> Floats:
+    """Angles of rotations (...), rad, without what rounding makes of the product of a rotation and its inverse."""
+    return np.where(angle_rad < _ROUNDING_RAD, 0.0, angle_rad)
+
+
+_ROUNDING_RAD = 1e-15  # a few units of the last place
 
 
 def compose(increment_rad: Floats, rotation: Floats) -> Floats:

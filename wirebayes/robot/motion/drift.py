@@ -8,6 +8,7 @@ import numpy as np
 from wirebayes.numeric.rows import chosen_rows
 from wirebayes.numeric.typing import Bools, Floats, Ints
 from wirebayes.progress import ShareDone, unseen
+from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.rotation import antisymmetric
 from wirebayes.robot.mechanics.wires import Wires
@@ -70,6 +71,7 @@ def hold(
         walk.to(float(time))
         rows.put(k, walk)
         progress((k + 1) / len(times))
+    rows.rest_at(start_m, start_rotation, robot.span_m)
     carried_on, falls = walk.creep.state(), walk.falls()
     return Course(times, rows.position_m, rows.rotation, rows.tension_N, rows.status, carried_on, falls)
 
@@ -95,6 +97,32 @@ class _Rows:
         self.rotation[:, k] = chosen_rows(live, here.rotation, np.nan)
         self.tension_N[:, k] = chosen_rows(live, here.tension_N, np.nan)
         self.status[:, k] = here.status
+
+    def rest_at(self, start_m: Floats, start_rotation: Floats, span_m: float) -> None:
+        """Take poses that differ from the start by nothing but rounding for the start: wires that do not creep."""
+        draws = len(self.position_m)
+        start = np.broadcast_to(start_m, (draws, 3))[:, None]
+        turned = np.broadcast_to(start_rotation, (draws, 3, 3))[:, None]
+        shift_m, angle = shift_and_turn(self.position_m, self.rotation, start, turned)
+        draw, time = np.nonzero(are_rounding(shift_m, angle, span_m))
+        self.position_m[draw, time] = start[draw, 0]
+        self.rotation[draw, time] = turned[draw, 0]
+
+
+def are_rounding(shift_m: Floats, angle_rad: Floats, span_m: float) -> Bools:
+    """Whether displacements (..., 3) and turns (...) are so small that they are rounding of equilibria, and no drift.
+
+    Parameters
+    ----------
+    shift_m : (..., 3) array
+    angle_rad : (...) array
+    span_m : float
+        The extent of the robot.
+    """
+    return (np.linalg.norm(shift_m, axis=-1) < ROUNDING * span_m) & (angle_rad < ROUNDING)
+
+
+ROUNDING = 1e-11  # of the robot's extent, and rad: more than equilibria are rounded by, a millionth of any real drift
 
 
 def from_command(
@@ -197,4 +225,4 @@ def shift_and_turn(
     # The antisymmetric part keeps small angles exact where the trace would lose half the digits.
     sine = np.linalg.norm(antisymmetric(turn), axis=-1)
     cosine = 0.5 * (np.trace(turn, axis1=-2, axis2=-1) - 1.0)
-    return position_m - origin_m, np.arctan2(sine, cosine)
+    return position_m - origin_m, turning.without_rounding(np.arctan2(sine, cosine))
