@@ -206,10 +206,18 @@ def test_a_link_opens_the_section_that_is_folded(pages, tab):
     tab.wait_for("document.querySelector('#figures-1-to-4 > details').open")
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_axe_finds_nothing_wrong(kind, pages, tab):
+SCHEMES = [(kind, "light") for kind in KINDS] + [(kind, "dark") for kind in ("reproduce", "discover", "pose", "check")]
+
+
+@pytest.mark.parametrize(("kind", "scheme"), SCHEMES)
+def test_axe_finds_nothing_wrong(kind, scheme, pages, tab):
+    tab.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
     for width in (WIDTHS[0], WIDTHS[-1]):
         tab.open(pages[kind], width)
+        grounds = tab.run(
+            "['body', 'figure img'].map(s => getComputedStyle(document.querySelector(s)).backgroundColor)"
+        )
+        assert scheme == "light" or grounds == ["rgb(20, 24, 27)", "rgb(255, 255, 255)"]
         tab.run(f"document.querySelectorAll('details').forEach(d => d.open = true); {axe()}; 0")
         found = tab.run(
             "axe.run({preload: false}).then(r => r.violations.map(v => [v.id, v.nodes.map(n => n.html.slice(0, 90))]))"
