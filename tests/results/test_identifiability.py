@@ -33,6 +33,7 @@ def normal_model(noise: dict[str, float], draws: int = 4000, total: float | None
     precision = np.eye(d) + design.T @ np.diag(error**-2.0) @ design
     theta = np.random.default_rng(0).multivariate_normal(np.zeros(d), np.linalg.inv(precision), draws)
     problem = SimpleNamespace(
+        samples=(),
         prior=Prior(dict.fromkeys(names, stats.norm(0.0, 1.0)), {}, frozenset()),
         names=names,
         log_likelihood=lambda rows: -0.5 * ((rows @ design.T / error) ** 2).sum(axis=1),
@@ -121,6 +122,7 @@ def sentence(contraction: float, sensitivity: float) -> str:
             "likelihood_sensitivity": 1.0,
             "ridges": {},
         },
+        "N",
     )
 
 
@@ -292,9 +294,10 @@ def test_a_ridge_names_all_who_are_on_it_but_itself() -> None:
             "likelihood_sensitivity": 1.0,
             "ridges": {"B": -0.95, "U": 0.991},
         },
+        "N",
     )
     assert words == (
-        "k1: the data determine it; its 90 % interval is 1.50 wide, the prior's 20.0; it is correlated with B "
+        "k1: the data determine it; its 90 % interval is 1.50 N wide, the prior's 20.0 N; it is correlated with B "
         "(r = −0.95) and U (r = 0.99), and their combination is known better."
     )
 
@@ -315,6 +318,7 @@ def creep_amounts(newtons: float) -> SimpleNamespace:
     powers = {"B": PowerScaled("U", float(np.log(newtons)))}
     prior = Prior(distributions, {}, frozenset(distributions), powers)
     problem = SimpleNamespace(
+        samples=(),
         prior=prior,
         names=prior.names,
         log_likelihood=lambda rows: -0.5 * (np.log(prior.known(rows)) ** 2 @ [1.0 / 0.02**2, 1.0 / 0.1**2]),

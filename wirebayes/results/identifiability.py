@@ -14,12 +14,13 @@ import numpy as np
 from wirebayes.inference.chain_statistics import pareto_smoothed, power_scaled, power_sensitivity
 from wirebayes.inference.fit import Fit
 from wirebayes.json_files.summary import CreepBand, ExtrapolatedCreep, Identifiability, IdentifiabilityFigures
+from wirebayes.model.column_units import unit_of_column
 from wirebayes.model.prior import Prior
 from wirebayes.numeric.distributions import log_density_of
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Array
 from wirebayes.results.contraction import contraction, source
-from wirebayes.sentences import lasting, number, short
+from wirebayes.sentences import lasting, number, short, unit_text
 from wirebayes.wire.fresh import FreshSample
 
 SENSITIVE = 0.05  # the threshold that the authors of the method propose
@@ -71,7 +72,9 @@ def identifiability(fitted: Fit) -> dict[str, Identifiability]:
             "likelihood_sensitivity": by_likelihood[i],
             "ridges": _ridges(problem.names, correlation, i),
         }
-        out[name] = {**figures, "sentence": parameter_in_words(name + _measured_at(prior, name), figures)}
+        unit = unit_of_column(name, problem.samples)
+        sentence = parameter_in_words(name + _measured_at(prior, name), figures, unit)
+        out[name] = {**figures, "sentence": sentence}
     return out
 
 
@@ -102,8 +105,16 @@ def _thinned(flat: Array) -> Array:
     return flat[evenly(len(flat), _DRAWS)]
 
 
-def parameter_in_words(name: str, figures: IdentifiabilityFigures) -> str:
-    """A sentence about one parameter."""
+def parameter_in_words(name: str, figures: IdentifiabilityFigures, unit: str) -> str:
+    """A sentence about one parameter.
+
+    Parameters
+    ----------
+    name : str
+    figures : dict
+    unit : str
+        Of the parameter, as in files; 1 and - are none.
+    """
     determined_by = source(figures["contraction"])
     sensitivity = figures["prior_sensitivity"]
     if determined_by == "prior":
@@ -113,7 +124,11 @@ def parameter_in_words(name: str, figures: IdentifiabilityFigures) -> str:
     else:
         verdict = "the data determine it"
     after, before = number(figures["posterior_range_90"]), number(figures["prior_range_90"])
-    wide = f"spans a factor of {after}" if figures["range_is_factor"] else f"is {after} wide"
+    wide = f"spans a factor of {after}"
+    if not figures["range_is_factor"]:
+        shown = f" {unit_text(unit)}".rstrip()
+        wide = f"is {after}{shown} wide"
+        before += shown
     text = f"{name}: {verdict}; its 90 % interval {wide}, the prior's {before}"
     with_whom = [f"{other} (r = {number(r, 2)})" for other, r in figures["ridges"].items()]
     if with_whom:

@@ -302,7 +302,7 @@ def _held_out(v: ExperimentFindings) -> list[str]:
     flexible = held.get("flexible")
     if v.get("accepted") and flexible:
         reached = number(read_value(flexible, "rmse"), 2)
-        text += f"; a smooth curve instead of a named effect reaches {reached}"
+        text += f"; a smooth curve instead of a named effect reaches {reached} {unit}"
     return [f"{text}."]
 
 
