@@ -327,8 +327,13 @@ class PoseJson(RobotOnWires):
 
 def stays(drift: Drift) -> bool:
     """Whether no draw of the wires moves the platform at any time: wires that do not creep."""
-    means = drift["distance_mm"]["mean"], drift["rotation_deg"]["mean"]
-    return all(mean is not None and all(value == 0 for value in mean) for mean in means)
+    return _is_zero(drift["distance_mm"]) and _is_zero(drift["rotation_deg"])
+
+
+def _is_zero(band: Band) -> bool:
+    """Whether what is never negative is zero at every time."""
+    high = band["q95"]
+    return high is not None and all(value == 0 for value in high)
 
 
 def known_at_the_end(drift: Drift) -> bool:

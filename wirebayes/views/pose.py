@@ -90,7 +90,8 @@ def _after_pose(found: PoseJson | PoseHistoryJson, folder: Path, given: Given) -
     if lost or not found.get("feasible", True):
         return "another pose or payload, or other bounds of the tension in the robot's file"
     calibrate = f"wirebayes calibrate {given.file} READINGS.csv{given.wires}"
-    if all(map(stays, cast(PoseJson, found)["drift"])):
+    drifts = cast(PoseJson, found).get("drift", [])
+    if drifts and all(map(stays, drifts)):
         return f"{calibrate}  (finds the lengths of its wires)"
     return f"{calibrate}  (when it drifts too far)"
 

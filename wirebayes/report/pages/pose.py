@@ -113,7 +113,8 @@ def _next(pose: PoseJson) -> str:
         return "Next: [plane] in the robot's file, if a table or a rail carries the platform; else another pose."
     if not pose["feasible"]:
         return "Next: another pose or payload, or other bounds of the tension in the robot's file."
-    if all(map(stays, pose["drift"])):
+    drifts = pose.get("drift", [])
+    if drifts and all(map(stays, drifts)):
         return "Next: wirebayes calibrate finds the wires' lengths."
     return "Next: wirebayes calibrate finds the wires' lengths again, once the drift is more than you allow."
 
