@@ -16,6 +16,7 @@ from wirebayes.inference.fit import Fit
 from wirebayes.json_files.summary import CreepBand, ExtrapolatedCreep, Identifiability, IdentifiabilityFigures
 from wirebayes.model.column_units import unit_of_column
 from wirebayes.model.prior import Prior
+from wirebayes.model.problem import Problem
 from wirebayes.numeric.distributions import log_density_of
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Array
@@ -72,10 +73,14 @@ def identifiability(fitted: Fit) -> dict[str, Identifiability]:
             "likelihood_sensitivity": by_likelihood[i],
             "ridges": _ridges(problem.names, correlation, i),
         }
-        unit = unit_of_column(name, problem.samples)
-        sentence = parameter_in_words(name + _measured_at(prior, name), figures, unit)
-        out[name] = {**figures, "sentence": sentence}
+        out[name] = {**figures, "sentence": _judged_in_words(problem, name, figures)}
     return out
+
+
+def _judged_in_words(problem: Problem, name: str, figures: IdentifiabilityFigures) -> str:
+    """A sentence about one parameter of a problem."""
+    called = name + _measured_at(problem.prior, name)
+    return parameter_in_words(called, figures, unit_of_column(name, problem.samples))
 
 
 def _measured_at(prior: Prior, name: str) -> str:
