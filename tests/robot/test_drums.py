@@ -18,7 +18,7 @@ from wirebayes.robot.mechanics.description import Drums
 from wirebayes.robot.motion import claim, forward, inverse
 from wirebayes.robot.pose.answer import pose_report
 from wirebayes.robot.pose.request import PoseRequest
-from wirebayes.robot.self_calibration import session_file
+from wirebayes.robot.self_calibration import session_file, whole_answer
 from wirebayes.strict.table import csv_table
 
 # one layer; five turns a layer; a spiral of one turn a layer; no drum known
@@ -129,13 +129,34 @@ def test_motor_angles_in_degrees_are_refused_with_their_unit(tmp_path):
         session_file.read_session(path, robot, 0.02, 1e-3)
 
 
-def test_a_hold_that_one_sensor_did_not_read_is_refused_with_the_rule(tmp_path):
+def test_a_hold_that_one_sensor_did_not_read_keeps_the_other_readings(tmp_path):
     robot = schema.read_robot_file("cogiro-desk")
     path = tmp_path / "session.csv"
     header = ",".join(session_header(robot, []))
     cells = [1, *robot.home_m, 0, 0, 0, 60, *[1.5] * 8, "", *[2.0] * 7]
     path.write_text(f"{header}\n{','.join(map(str, cells))}\n", encoding="utf-8")
-    with pytest.raises(InputError, match="line 2: .* all or none: a hold is read by all sensors or by none"):
+    session, readings = session_file.read_session(path, robot, 0.02, 1e-3)
+    assert session.read.tolist() == [True]
+    np.testing.assert_array_equal(readings, [np.nan, *[100.0] * 7])
+    holds = whole_answer.holds_of(robot, session, readings)
+    np.testing.assert_array_equal(holds.tension_N, [[np.nan, *[2.0] * 7]])
+
+
+@pytest.mark.parametrize(
+    ("tensions", "normal", "found"),
+    [
+        ([2.0] * 8, ["", ""], "line 2: found tensions or the normal empty, expected both or none"),
+        ([""] * 8, [0.0, 0.0], "line 2: found tensions or the normal empty, expected both or none"),
+        ([2.0] * 8, [0.0, ""], "line 2: found some cells of the normal empty, expected all or none"),
+    ],
+)
+def test_tensions_and_the_normal_are_read_together(tmp_path, tensions, normal, found):
+    robot = schema.read_robot_file("cogiro-desk")
+    path = tmp_path / "session.csv"
+    header = ",".join([*session_header(robot, []), "normal_x", "normal_y"])
+    cells = [1, *robot.home_m, 0, 0, 0, 60, *[1.5] * 8, *tensions, *normal]
+    path.write_text(f"{header}\n{','.join(map(str, cells))}\n", encoding="utf-8")
+    with pytest.raises(InputError, match=found):
         session_file.read_session(path, robot, 0.02, 1e-3)
 
 

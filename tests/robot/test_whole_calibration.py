@@ -27,6 +27,42 @@ def test_rows_without_a_pose_and_unknown_anchors_are_estimated(fitted, session_c
     np.testing.assert_allclose(schema.read_robot_file(tmp_path / "out/robot.toml").exit_m, exits["mean"], atol=1e-6)
 
 
+@pytest.mark.parametrize(("wires", "holds"), [([3], [2]), ([3], [1, 2, 3, 4]), ([1, 6], [1, 3])])
+def test_what_one_sensor_did_not_read_costs_no_other_reading(fitted, session_csv, tmp_path, wires, holds):  # noqa: F811
+    """A dead sensor, or one that fails now and then: its wire is known less well, and better than without the holds."""
+    file, truth = session_csv
+    whole_sd = _lengths(file, fitted, tmp_path / "whole", truth)
+    lines = [line.split(",") for line in file.read_text().splitlines()]
+    first = lines[0].index("tension_1_N")
+
+    def without(cells):
+        rows = [list(line) for line in lines]
+        for hold in holds:
+            for cell in cells:
+                rows[1 + hold][first + cell] = ""
+        file.write_text("\n".join(",".join(row) for row in rows) + "\n")
+
+    without([wire - 1 for wire in wires])
+    sd = _lengths(file, fitted, tmp_path / "some", truth)
+    missing = [wire - 1 for wire in wires]
+    assert (sd[missing] > whole_sd[missing]).all()
+    if len(holds) < 4:
+        without(range(7))
+        fewer = _lengths(file, fitted, tmp_path / "fewer", truth)
+        assert (sd[:6] < fewer[:6]).all()  # the seventh wire, which hangs down, is not determined by any of them
+
+
+def _lengths(session, wires, out, truth):
+    """Standard errors of the lengths of linear-7, which are found and usable."""
+    arguments = ["calibrate", "linear-7", str(session), "--wires", str(wires), "--draws", "40", "--next-poses", "0"]
+    assert main([*arguments, "--output", str(out)]) == 0
+    found = read_json(out / "calibration.json")
+    assert found["usable"]
+    length = found["with_creep_model"]["length_m"]
+    assert _near(length, truth)
+    return np.array(length["sd"])
+
+
 def test_intervals_rest_on_as_many_degrees_of_freedom_as_follow_the_joint_error():
     sd = np.array([1.0, 1.0, 1.0, 0.0])
     wider = sd * summary._FACTOR ** np.array([1.0, 0.5, 0.0, 0.0])

@@ -52,7 +52,7 @@ def refuse_mistaken(robot: Robot, session: Session, tension_N: Floats, table: Cs
     if robot.winch is not None or placed.sum() < _FEWEST:
         return
     _refuse_lengths(robot, session, placed, table, joints)
-    read = placed & session.read
+    read = placed & np.isfinite(tension_N).all(1)  # what carries the platform needs every wire
     if read.sum() >= _FEWEST:
         _refuse_tensions(robot, session, tension_N, read, table)
 
@@ -70,7 +70,7 @@ def tension_notices(robot: Robot, session: Session, readings: Floats) -> list[No
     count = int(session.read.sum()) * robot.legs
     if not count:
         return []
-    usual = float(np.median(readings[:count])) * session.tension_sd_N
+    usual = float(np.nanmedian(readings[:count])) * session.tension_sd_N
     low, high = robot.rule.lowest_N, robot.rule.highest_N
     if low / _OUTSIDE <= usual <= _OUTSIDE * high:
         return []

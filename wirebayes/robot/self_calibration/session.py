@@ -37,7 +37,7 @@ class Session:
     joint_m : (p, w) array
     duration_s : (p,) array
     read : (p,) bool array
-        True where tensions were read, at the hold's end.
+        True where tensions were read, at the hold's end; readings of single wires may be missing.
     tension_sd_N : float
     tilt_sd_rad : float or None
         Error of the two components of the platform's normal, when an inclinometer is on board.

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from wirebayes.errors import InputError
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.joint_columns import joint_columns, joint_values
 from wirebayes.robot.mechanics.rotation import matrix
@@ -42,11 +42,12 @@ def read_session(
 ) -> tuple[Session, Floats]:
     """A session and its standardised readings ``(r,)``.
 
-    A row without tensions is a hold that was not read; one without a position is a hold at a pose that nobody knows,
-    and one without a rotation at an orientation that nobody knows: NaN in the session. So are all rows of a table that
-    leaves these columns out. With the columns
-    ``normal_x,normal_y`` an inclinometer's readings join in. Tensions may be below zero by their noise, and by any
-    amount where sensors may be `biased`; directions of motion, ``motion_1`` and so on, may be given for these only.
+    A row without tensions is a hold that was not read; where those of some wires are missing, the others count, and the
+    readings are NaN for those. A row without a position is a hold at a pose that nobody knows, and one without a
+    rotation at an orientation that nobody knows: NaN in the session. So are all rows of a table that leaves these
+    columns out. With the columns ``normal_x,normal_y`` an inclinometer's readings join in. Tensions may be below zero
+    by their noise, and by any amount where sensors may be `biased`; directions of motion, ``motion_1`` and so on, may
+    be given for these only.
 
     Raises
     ------
@@ -113,12 +114,12 @@ def parse_session(
     tension, normal = some(tensions), some(NORMAL if tilted else ())
     position, turn = some(POSITION), some(TURN)
     plausible.refuse_far(robot, position, table, POSITION)
-    _refuse_half(
-        table, np.concatenate([tension, normal], axis=1), "the readings", ": a hold is read by all sensors or by none"
-    )
+    was_read = np.asarray(np.isfinite(tension).any(1))
+    if tilted:
+        _refuse_half(table, normal, "the normal")
+        _refuse_tilt_alone(table, was_read, normal)
     _refuse_half(table, position, "the position")
     _refuse_half(table, turn, "the rotation")
-    was_read = np.asarray(np.isfinite(tension).all(1))
     session = Session(
         position,
         _rotations(robot, position, turn),
@@ -165,14 +166,25 @@ def _refuse_twice(table: CsvTable, number: Floats) -> None:
             raise table.complain(row, "hold", f"{value:g} once more", "a row for each hold")
 
 
-def _refuse_half(table: CsvTable, cells: Floats, name: str, why: str = "") -> None:
+def _refuse_half(table: CsvTable, cells: Floats, name: str) -> None:
     """Refuse rows with some of several cells empty."""
     given = np.isfinite(cells)
-    half = given.any(1) & ~given.all(1)
+    half = np.logical_and(given.any(1), ~given.all(1))
     if half.any():
-        line = table.place(int(np.argmax(half)), "hold").partition(", column")[0]
-        found = f"found some cells of {name} empty, expected all or none"
-        raise InputError(f"{table.path}, {line}: {found}{why}")
+        raise _complain_of_row(table, half, f"found some cells of {name} empty, expected all or none")
+
+
+def _refuse_tilt_alone(table: CsvTable, was_read: Bools, normal: Floats) -> None:
+    """Refuse rows with tensions and no normal, or a normal and no tension: both are read when a hold ends."""
+    odd = np.logical_xor(was_read, np.isfinite(normal).all(1))
+    if odd.any():
+        raise _complain_of_row(table, odd, "found tensions or the normal empty, expected both or none")
+
+
+def _complain_of_row(table: CsvTable, rows: Bools, found: str) -> InputError:
+    """The error of the first of some rows (p,)."""
+    line = table.place(int(np.argmax(rows)), "hold").partition(", column")[0]
+    return InputError(f"{table.path}, {line}: {found}")
 
 
 def may_be_empty(name: str) -> bool:
