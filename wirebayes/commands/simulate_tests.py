@@ -212,23 +212,29 @@ def _check_protocol(
     unrecorded: frozenset[int],
 ) -> None:
     """Refuse what no bench could do."""
-    shortest, longest, least = min(lengths), max(lengths), min(path)
+    _check_lengths(lengths)
+    least, shortest = min(path), min(lengths)
+    if control == "force" and least <= 0:
+        raise InputError(f"--weights: found {least:g}, expected more than 0 N")
+    if control == "displacement" and least <= -shortest:
+        raise InputError(f"--displacements: found {least:g}, expected more than -{shortest:g} mm, a length")
+    is_rising = all(before < after for before, after in pairwise(times))
+    if times[0] < 0 or not is_rising:
+        raise InputError(f"--times: found {text_of(times)!r}, expected rising times from 0 s on")
+    last = len(path) - 1
+    if not unrecorded <= set(range(1, last + 1)):
+        raise InputError(f"--unrecorded: found {max(unrecorded)}, expected a hold from 1 to {last}")
+
+
+def _check_lengths(lengths: Sequence[float]) -> None:
+    """Refuse lengths that no wire has, and a length given twice."""
+    shortest, longest = min(lengths), max(lengths)
     is_repeated = len(set(lengths)) < len(lengths)
     if shortest <= 0 or is_repeated:
         raise InputError(f"--lengths: found {text_of(lengths)!r}, expected different lengths above 0 mm")
     if shortest < SHORTEST or longest > LARGEST["displacement_mm"]:
         expected = f"lengths from {SHORTEST:.0e} to {LARGEST['displacement_mm']:.0e} mm"
         raise InputError(f"--lengths: found {text_of(lengths)!r}, expected {expected}")
-    if control == "force" and least <= 0:
-        raise InputError(f"--weights: found {least:g}, expected more than 0 N")
-    if control == "displacement" and least <= -shortest:
-        raise InputError(f"--displacements: found {least:g}, expected more than -{shortest:g} mm, a length")
-    rising = all(before < after for before, after in pairwise(times))
-    if times[0] < 0 or not rising:
-        raise InputError(f"--times: found {text_of(times)!r}, expected rising times from 0 s on")
-    last = len(path) - 1
-    if not unrecorded <= set(range(1, last + 1)):
-        raise InputError(f"--unrecorded: found {max(unrecorded)}, expected a hold from 1 to {last}")
 
 
 def _name(tests: int, lengths: Sequence[float], test: int, length: float) -> str:

@@ -145,28 +145,55 @@ def friction_departure(robot: Robot, wires: Wires, poses: Poses, lengths: Length
     float
         Of the largest friction, the largest difference at the ends of the ellipsoid, median over draws.
     """
-    known, (x, R) = robot.plane, poses
-    assert known is not None and robot.motions is not None
-    most_N = known.friction * abs(normal_N)
+    plane, (x, R) = robot.plane, poses
+    assert plane is not None and robot.motions is not None
+    most_N = plane.friction * abs(normal_N)
     if most_N == 0:
         return 0.0
     pull, stiffness = _pull(robot, wires, x, R, lengths)
     square = _held_square(robot, stiffness, normal_N)
+    departures = []
+    for way in _ways(robot):
+        end = _end_along(square, way)
+        at_end = x + end[:, :3], _turned(robot, R, end)
+        there, _ = _pull(robot, wires, *at_end, lengths)
+        foreseen = (stiffness @ end[..., None])[..., 0] @ robot.motions
+        surplus = _as_forces(robot, there - pull - foreseen)
+        departures.append(np.linalg.norm(surplus, axis=1))
+    largest = np.max(departures, axis=0)
+    return float(np.median(largest) / most_N)
+
+
+def _ways(robot: Robot) -> Floats:
+    """(k, d) unit displacements along the axes and, of a platform that turns, about the normal."""
+    assert robot.plane is not None
     ways = np.eye(robot.degrees)
     if robot.degrees == 6:
-        ways = np.vstack([ways[:3], np.append(np.zeros(3), known.normal)])
+        about_normal = np.append(np.zeros(3), robot.plane.normal)
+        ways = np.vstack([ways[:3], about_normal])
+    return ways
+
+
+def _end_along(square: Floats, way: Floats) -> Floats:
+    """(n, d) ends along a way (d,) of ellipsoids with the matrices (n, d, d)."""
+    across = square @ way
+    half = np.sqrt(across @ way)[:, None]
+    return np.divide(across, half, out=np.zeros_like(across), where=half > 0)
+
+
+def _turned(robot: Robot, R: Floats, displacement: Floats) -> Floats:
+    """Rotations (n, 3, 3) turned on by displacements (n, d); of a point, as they are."""
+    if robot.degrees < 6:
+        return R
+    turned = turning.compose(displacement[:, 3:].T, batch_last(R))
+    return batch_first(turned)
+
+
+def _as_forces(robot: Robot, wrench: Floats) -> Floats:
+    """Forces and moments (n, d), moments as the forces at the ring that bear them."""
     ring = _ring(robot)
     unit = np.divide(1.0, ring, out=np.zeros_like(ring), where=ring > 0)
-    off = []
-    for way in ways:
-        across = square @ way
-        half = np.sqrt(across @ way)[:, None]
-        end = np.divide(across, half, out=np.zeros_like(across), where=half > 0)
-        turned = batch_first(turning.compose(end[:, 3:].T, batch_last(R))) if robot.degrees == 6 else R
-        there, _ = _pull(robot, wires, x + end[:, :3], turned, lengths)
-        foreseen = (stiffness @ end[..., None])[..., 0] @ robot.motions
-        off.append(np.linalg.norm((there - pull - foreseen) * unit, axis=1))
-    return float(np.median(np.max(off, axis=0)) / most_N)
+    return wrench * unit
 
 
 def _pull(robot: Robot, wires: Wires, x: Floats, R: Floats, lengths: Lengths) -> tuple[Floats, Floats]:
