@@ -185,3 +185,15 @@ def test_what_numbers_the_loads_of_a_test_numbers_its_holds(tmp_path, header):
 def test_a_number_amid_other_words_numbers_no_holds(tmp_path, header):
     lines = [f"{time};{x};{y}" for time, x, y in ROWS]
     assert_is_the_test(read(tmp_path, [f"Time (s);Position (mm);{header}"], lines))
+
+
+@pytest.mark.parametrize("name", ["carriage_um", "Slide [µm]", "Schlitten (µm)", "Carrello (µm)"])
+def test_what_moves_on_a_rig_is_the_displacement_where_nothing_else_is(tmp_path, name):
+    rows = [
+        f"{1000 * (61 * hold + t)}\t{100.0 * hold - t / 10:.1f}\t{1000 * hold}" for hold in (1, 2) for t in (0, 5, 10)
+    ]
+    made = read(tmp_path, [f"millis\tload_g\t{name}"], rows, time_since="test")
+    assert [hold.setting for hold in made.experiment.holds] == [1.0, 2.0]
+    with_displacement = [f"{row}\t{row.split()[-1]}7" for row in rows]
+    beside = read(tmp_path, [f"millis\tload_g\t{name}\tdisplacement_um"], with_displacement, time_since="test")
+    assert [hold.setting for hold in beside.experiment.holds] == [10.007, 20.007]

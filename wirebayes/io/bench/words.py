@@ -83,7 +83,8 @@ LENGTHS = (
 RIG_WORDS: dict[Role, tuple[str, ...]] = {
     "displacement": ("dial", "indicator", "messuhr", "comparateur", "comparador", "comparatore", "meetklok", "distance",
                      "entfernung", "langenanderung", "ruler", "lineal", "regle", "regla", "righello", "regua",
-                     "liniaal", *LENGTHS),
+                     "liniaal", "carriage", "slide", "ram", "jaw", "schlitten", "chariot", "carro",
+                     "carrello", *LENGTHS),
     "tension": ("mass", "weight", "masse", "gewicht", "poids", "peso", "massa", "masa", "waga",
                 "vikt", "hmotnost", "zavazi", "tomeg", "suly", "kutle", "agırlık", "agirlik", "μαζα", "βαροσ"),
     "time": ("day", "tag", "jour", "dia", "giorno", "dag", "week", "woche",
