@@ -15,6 +15,8 @@ from wirebayes.report.page import _way
 ROOT = Path(__file__).parents[1]
 CHECK = ["check", str(ROOT / "data" / "paper" / "experiments.toml"), "--experiment", "nylon-1.5m"]
 NO_ROOM = "standard output: cannot be written (No space left on device), expected room for what is printed\n"
+CLOSED = ">&-", "<&- >&- 2>&-", "| true", "2>&1 | head -c 1"
+LATER = {"check": CLOSED[::3], "effects": CLOSED[1:3]}  # in the full tests, for commands that load much: half of each
 ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="written for a POSIX shell")
 
@@ -27,10 +29,16 @@ def in_shell(arguments, redirection, **variables):
     return done.returncode, done.stdout, done.stderr.decode()
 
 
-@pytest.mark.parametrize("arguments", [CHECK, ["effects"], ["--help"], ["fit", "--help"], ["--version"]])
-@pytest.mark.parametrize("redirection", [">&-", "<&- >&- 2>&-", "| true", "2>&1 | head -c 1"])
-def test_streams_that_are_closed_or_that_nobody_reads(arguments, redirection):
-    code, _, said = in_shell(arguments, redirection)
+@pytest.mark.parametrize(
+    ("arguments", "way"),
+    [
+        pytest.param(arguments, way, marks=pytest.mark.slow if way in LATER.get(arguments[0], ()) else [])
+        for arguments in (CHECK, ["effects"], ["--help"], ["fit", "--help"], ["--version"])
+        for way in CLOSED
+    ],
+)
+def test_streams_that_are_closed_or_that_nobody_reads(arguments, way):
+    code, _, said = in_shell(arguments, way)
     assert (code, said) == (0, "")
 
 
@@ -42,17 +50,18 @@ def test_standard_output_without_room_is_one_line(arguments):
 
 def test_no_stream_that_is_closed_lends_its_number_to_a_file_of_results(tmp_path):
     code, _, _ = in_shell([*CHECK, "--output", str(tmp_path / "o")], ">&- 2>&-")
-    in_the_open = in_shell([*CHECK, "--output", str(tmp_path / "p")], "")
-    assert (code, in_the_open[0]) == (0, 0)
+    in_the_open = main([*CHECK, "--output", str(tmp_path / "p")])
+    assert (code, in_the_open) == (0, 0)
     for path in (tmp_path / "p").iterdir():
         assert (tmp_path / "o" / path.name).read_bytes() == path.read_bytes()
 
 
-def test_letters_that_an_encoding_lacks():
+def test_letters_that_an_encoding_lacks(capfd):
     code, said, errors = in_shell(CHECK, "", **ASCII)
     assert (code, errors) == (0, "") and b"mm N\\u207b\\u1d41" in said
     code, said, _ = in_shell([*CHECK, "--json"], "", **ASCII)
-    _, as_utf_8, _ = in_shell([*CHECK, "--json"], "", PYTHONIOENCODING="utf-8")
+    assert main([*CHECK, "--json"]) == 0
+    as_utf_8 = capfd.readouterr().out
     assert code == 0 and said.isascii() and not as_utf_8.isascii()
     assert json.loads(said) == json.loads(as_utf_8)
 

@@ -171,6 +171,7 @@ def test_a_slip_names_its_hold(tmp_path: Path) -> None:
     assert found["best"] == "grip_slip" and found["amplitudes"]["grip_slip"]["hold"] == 7
 
 
+@pytest.mark.slow  # beside a toe it is named, too
 def test_play_shows_on_the_way_back(tmp_path: Path) -> None:
     bench = Bench(displacements_mm=UP_AND_DOWN)
     found = answer(made(tmp_path, [bench], {"lost_motion.w": 0.08}, [effect_named("lost_motion")]))

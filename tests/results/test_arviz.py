@@ -265,8 +265,12 @@ def drawn(data: Any, names: list[str]) -> None:
             plt.close("all")
 
 
+# one sample, two fitted together, and a discrepancy; the others in the full tests
+FEW_KINDS = [k if k in ("chain", "together", "unknown") else pytest.param(k, marks=pytest.mark.slow) for k in KINDS]
+
+
 @OLD_PICTURES
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", FEW_KINDS)
 def test_predictive_plots(stored: dict[str, tuple[Path, Fit]], kind: str) -> None:
     drawn(opened(stored, kind), ["ppc", "loo_pit", "khat"])
 

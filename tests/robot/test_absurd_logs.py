@@ -121,7 +121,7 @@ def test_a_column_of_other_holds_ends_early_and_is_named(monkeypatch):
         joints = [log[f"joint_{i}_m"] for i in (4, 1, 2, 3)]  # back from where `_turned_log` has them
         return log | {f"joint_{i}_m": values[::-1] if i == 3 else values for i, values in enumerate(joints, 1)}
 
-    found = _calibrated(changed=mixed_up, progress=lambda name, done, total: said.append((name, done)))
+    found = _calibrated(24, changed=mixed_up, progress=lambda name, done, total: said.append((name, done)))
     for name in ("start 1", "start 2", "start 3"):
         assert len([1 for one, _ in said if one == name]) <= 13  # eleven rounds, the end
     (notice,) = found.content["warnings"]

@@ -9,7 +9,11 @@ from wirebayes.robot.mechanics.wire_doubts import wire_warnings
 from wirebayes.robot.pose.answer import pose_report
 from wirebayes.robot.pose.request import PoseRequest, band_over_draws
 
-TIMES = np.array([0.0, 60.0])
+
+def _request(robot, rotation=None):
+    """Home for a minute. The tolerance is left at once: for how long the pose is within it is not asked here."""
+    turned = np.eye(3) if rotation is None else rotation
+    return PoseRequest(robot.home_m, turned, np.array([0.0, 60.0]), tolerance_m=1e-9)
 
 
 def _line(n, k1, law="hooke"):
@@ -19,7 +23,7 @@ def _line(n, k1, law="hooke"):
 def test_wires_too_weak_for_the_robot_are_an_answer_not_a_crash(tmp_path):
     # law (3) pulls with k1 at most: 3 N a wire cannot hold a platform that asks for five
     robot = schema.read_robot_file("cogiro-desk")
-    request = PoseRequest(robot.home_m, np.eye(3), TIMES)
+    request = _request(robot)
     found = pose_report(robot, _line(40, 3.0, "modified"), request)
     content = found.content
     assert not content["feasible"]
@@ -34,7 +38,7 @@ def test_some_draws_too_weak_are_counted_and_left_out(tmp_path):
     robot = schema.read_robot_file("cogiro-desk")
     weak, strong = _line(20, 3.0, "modified"), _line(20, 800.0, "modified")
     both = {k: np.concatenate([weak.parameters[k], strong.parameters[k]]) for k in strong.parameters}
-    request = PoseRequest(robot.home_m, np.eye(3), TIMES)
+    request = _request(robot)
     found = pose_report(robot, draws.WireDraws(both, 1000.0, "modified"), request)
     content = found.content
     assert content["feasible_draws"] == 0.5
@@ -49,7 +53,7 @@ def test_some_draws_too_weak_are_counted_and_left_out(tmp_path):
 
 def test_one_draw_is_enough():
     robot = schema.read_robot_file("hangprinter-4")
-    content = pose_report(robot, _line(1, 5000.0), PoseRequest(robot.home_m, np.eye(3), TIMES)).content
+    content = pose_report(robot, _line(1, 5000.0), _request(robot)).content
     assert content["forward"]["solved"] == 1.0
     assert "sentence" in content["variance_shares"]
 
@@ -64,7 +68,7 @@ def test_given_wires_have_no_uncertainty_and_keep_their_leg():
     assert wires.theta["k1"].shape == (6, 20)
     np.testing.assert_array_equal(wires.theta["k1"][0], 5e4)
     np.testing.assert_array_equal(wires.theta["k1"][1], wires.theta["k1"][5])
-    content = pose_report(mixed, _line(20, 800.0), PoseRequest(mixed.home_m, np.eye(3), TIMES)).content
+    content = pose_report(mixed, _line(20, 800.0), _request(mixed)).content
     assert content["forward"]["largest_round_trip_error_m"] < 1e-9
 
 
@@ -85,7 +89,7 @@ def test_creep_grows_with_the_length_as_the_joint_fit_says(name, leg):
     elongation = line.parameters["B"] * (leg / 1.0) ** exponent  # of the leg's own wire at 1 N, mm
     tested = wires.theta["B"][-1] / wires.length_mm[-1] * 1e3 * leg
     np.testing.assert_allclose(tested, elongation, rtol=1e-5)
-    content = pose_report(robot, scaled, PoseRequest(robot.home_m, np.eye(3), TIMES)).content
+    content = pose_report(robot, scaled, _request(robot)).content
     assert content["variance_shares"]["shared_draw"][draws.LENGTH_EXPONENT] > 0.1
     assert any("exponent" in notice["text"] for notice in content["warnings"]) or name == "linear-6"
 
@@ -104,7 +108,7 @@ def test_tilt_is_measured_against_the_commanded_normal_and_against_the_vertical(
 
     robot = schema.read_robot_file("cogiro-desk")
     leaning = matrix(np.array([0.05, 0.0, 0.3]))
-    drift = pose_report(robot, _line(40, 800.0), PoseRequest(robot.home_m, leaning, TIMES)).content["drift"][0]
+    drift = pose_report(robot, _line(40, 800.0), _request(robot, leaning)).content["drift"][0]
     away = np.degrees(np.arccos(leaning[2, 2]))
     assert drift["tilt_deg"]["q95"][0] < 1e-6
     assert 0 < drift["tilt_deg"]["q50"][1] < 0.5

@@ -43,12 +43,14 @@ def fitted(tmp_path_factory):
     return folders
 
 
-@pytest.mark.parametrize("effect", EFFECTS)
+# `test_drift` follows effects of the catalogue into a robot, too
+@pytest.mark.parametrize("effect", [pytest.param("strain_stiffening", marks=pytest.mark.slow), "own_power"])
 def test_pose_bends_the_wires_as_the_fitted_effect_does(fitted, tmp_path, effect):
     column, own, strain = EFFECTS[effect]
     out = tmp_path / "out"
     arguments = ["pose", "cogiro-desk", "--wires", str(fitted[effect]), "--other-fit", str(fitted["plain"])]
     arguments += ["--output", str(out), "--times", "0,60", "--draws", "50"]
+    arguments += ["--tolerance", "1e-6"]  # left at once: for how long the pose is within it is not asked here
     assert main([*arguments, *(["--own-effects", str(own)] if own else [])]) == 0
     message = read_json(out / "pose.json")
     assert message["wires"]["effects"] == [effect]

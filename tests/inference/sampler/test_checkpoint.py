@@ -3,6 +3,7 @@
 import json
 import random
 import re
+import shutil
 import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -55,6 +56,18 @@ STAGES: dict[str, Callable[[Mapping[str, Any]], bool]] = {
 }
 
 
+def keep_each_stage(folder: Path, kept: Path, patch: pytest.MonkeyPatch) -> None:
+    """Copy a fit's folder to ``kept/STAGE`` whenever it wrote the first resume file of a stage, as a kill leaves it."""
+
+    def write(*arguments: Any, whole: Callable[..., None] = checkpoint.write_checkpoint) -> None:
+        whole(*arguments)
+        for name, is_reached in STAGES.items():
+            if is_reached(arguments[2]) and not (kept / name).exists():
+                shutil.copytree(folder, kept / name)
+
+    patch.setattr(checkpoint, "write_checkpoint", write)
+
+
 def one_fit(folder: Path) -> dict[str, bytes]:
     """A fit that learns its proposal again, twice by its kept draws and once anew, whatever that promises."""
     kite = next(experiment for experiment in paper.experiments() if experiment.name == "kite-1.5m")
@@ -66,21 +79,33 @@ def one_fit(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    return one_fit(tmp_path_factory.mktemp("undisturbed"))
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, bytes], Path]:
+    """What a fit left, and the folder of its stages."""
+    folder, kept = (tmp_path_factory.mktemp(name) for name in ("undisturbed", "stages"))
+    with pytest.MonkeyPatch.context() as patch:
+        keep_each_stage(folder, kept, patch)
+        return one_fit(folder), kept
 
 
 @pytest.mark.parametrize("stage", STAGES)
 def test_a_fit_killed_in_any_stage_goes_on_to_the_same_bytes(
-    stage: str, undisturbed: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    stage: str, undisturbed: tuple[dict[str, bytes], Path]
+) -> None:
+    whole, kept = undisturbed
+    assert (kept / stage / "kite" / ".checkpoint").exists()
+    assert one_fit(kept / stage) == whole
+    assert {"posterior.nc", "summary.json"} <= whole.keys()
+
+
+def test_a_fit_that_ends_by_an_error_leaves_its_resume_file_and_goes_on(
+    undisturbed: tuple[dict[str, bytes], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
-        kill_once(STAGES[stage], patch)
+        kill_once(STAGES["learned again"], patch)
         with pytest.raises(Killed):
             one_fit(tmp_path)
     assert (tmp_path / "kite" / ".checkpoint").exists()
-    assert one_fit(tmp_path) == undisturbed
-    assert {"posterior.nc", "summary.json"} <= undisturbed.keys()
+    assert one_fit(tmp_path) == undisturbed[0]
 
 
 def flat(stored: Any) -> Any:

@@ -182,6 +182,8 @@ def _is_word(word: str, role: Role) -> bool:
 
 def plain_letters(text: str) -> str:
     """Small letters without accents."""
+    if text.isascii():  # as most cells of long files are
+        return text.lower().strip(" .:_#")
     apart = unicodedata.normalize("NFKD", text.casefold().replace("ß", "ss"))
     joined = "".join(c for c in apart if not unicodedata.combining(c) or c == "\u3099")
     return unicodedata.normalize("NFC", joined).strip(" .:_#")
