@@ -9,11 +9,13 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.inference.between_specimens import between_specimens
 from wirebayes.numeric.evenly import evenly
+from wirebayes.numeric.means import geometric_mean
 from wirebayes.numeric.typing import Floats
 from wirebayes.results import read_back
 from wirebayes.results.read_back import Stored
 from wirebayes.robot.mechanics.draws import CORE, LENGTH_EXPONENT, WireDraws, material
 from wirebayes.views.posterior import POSTERIOR
+from wirebayes.wire.effect import Typical
 
 
 def read_wires(folder: Path, count: int, experiment: str | None = None, own_effects: Path | None = None) -> WireDraws:
@@ -110,21 +112,36 @@ def draws_of_specimens(
     each = [usable_draws(stored, str(folder), count) for folder, stored in zip(folders, tests, strict=True)]
     _check_plain_and_alike(folders, each)
     first = each[0]
-    logarithms = [_log_core_of_length(stored, first.length_mm) for stored in tests]
-    log_prior = _log_core(read_back.prior_draws(folders[0], experiment))
+    typical = Typical(*(geometric_mean(one.typical[i] for one in each) for i in range(2)))
+    logarithms = [_at_typical(_log_core_of_length(stored, first.length_mm), typical) for stored in tests]
+    log_prior = _at_typical(_log_core(read_back.prior_draws(folders[0], experiment)), typical)
     prior = log_prior.mean(0), np.cov(log_prior.T)
     found = between_specimens(logarithms, prior, count, np.random.default_rng(0))
-    means = np.exp(found.mean)
+    means = np.exp(_at_typical(found.mean, typical, back=True))
     return replace(
         first,
         parameters=dict(zip(CORE, means.T, strict=True)),
         effects=(),
+        typical=typical,
         tension_range_N=_widest([one.tension_range_N for one in each]),
         time_range_s=_widest([one.time_range_s for one in each]),
         spread=dict(zip(CORE, found.spread.T, strict=True)),
         specimens=len(each),
         doubts=tuple(doubt for one in each for doubt in one.doubts),
     )
+
+
+def _at_typical(logarithms: Floats, typical: Typical, *, back: bool = False) -> Floats:
+    """(n, p) logarithms of the parameters with the creep at the typical tension and the hazard after a typical hold.
+
+    These stand in the places of B and k2, or, on the way back, B and k2 in theirs: how much specimens differ in the
+    creep at one newton depends on what is called a newton.
+    """
+    out = logarithms.copy()
+    for name, exponent, scale in (("B", "U", typical.tension_N), ("k2", "N", typical.hold_s)):
+        moved = np.exp(logarithms[:, CORE.index(exponent)]) * np.log(scale)
+        out[:, CORE.index(name)] += -moved if back else moved
+    return out
 
 
 def _log_core_of_length(stored: Stored, length_mm: float) -> Floats:

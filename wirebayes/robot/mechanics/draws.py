@@ -51,7 +51,8 @@ class WireDraws:
         Lines of legs with other names, as many draws each, independent of these.
     spread : mapping of name to (n,) array
         Standard deviations of the logarithms of `CORE` from specimen to specimen, where several were tested; the
-        parameters are then the line's. Empty: a stated spread is used.
+        parameters are then the line's. Those of B and k2 are of the creep at the typical tension and of the hazard
+        after a typical hold. Empty: a stated spread is used.
     specimens : int
         How many were tested.
     doubts : tuple of Notice
@@ -164,13 +165,34 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
         exponents = [one.parameters.get(LENGTH_EXPONENT, np.ones(1)) for one in lines]
         theta["B"] = theta["B"] * longer ** (_of_legs(exponents, line.count) - 1.0)
     reference = _reference_tension(line, lines)
-    typical = _typical(line, lines)
+    typical = typical_of_legs(line, lines)
     hold = steady_hold(theta, length * longer, reference, length_ref_mm=length, typical=typical)
     effects = _united(line)
     at_sample = Placed(_at_sample(effects), theta)
     theta = dict(at_sample.change("sample", theta, hold))
     others = tuple(effect for effect in effects if effect.place != "sample")
     return Wires(line.law, line.history, theta, length, others, reference)
+
+
+def differing_by(theta: Mapping[str, Floats], factors: Mapping[str, Floats], typical: Typical) -> dict[str, Floats]:
+    """Parameters of specimens that differ from those of their line by factors.
+
+    B and k2 differ as the creep at the typical tension and the hazard after a typical hold do, for which of the tests
+    these were does not depend on units: where U or N differs, too, they follow.
+
+    Parameters
+    ----------
+    theta : mapping of name to (w, n) or (1, n) array
+        Of the line.
+    factors : mapping of name to (w, n) array
+    typical : Typical
+        Of the tests of each leg's line.
+    """
+    out = {name: theta[name] * factor for name, factor in factors.items()}
+    for name, exponent, scale in (("B", "U", typical.tension_N), ("k2", "N", typical.hold_s)):
+        if exponent in out:
+            out[name] = out.get(name, theta[name]) * scale ** (theta[exponent] - out[exponent])
+    return out
 
 
 def _times_as_long(robot: Robot, length_mm: Floats) -> Floats:
@@ -184,10 +206,12 @@ def _spread_specimens(
 ) -> None:
     """Let parameters differ from leg to leg."""
     lines = lines_of(robot, line)
+    differs = {}
     for name in differing(line):
         sd = _of_legs([spread_of(one, name, spread) for one in lines], line.count)
         noise = rng.standard_normal((robot.legs, line.count))
-        theta[name] = theta[name] * np.exp(sd * noise)
+        differs[name] = np.exp(sd * noise)
+    theta |= differing_by(theta, differs, typical_of_legs(line, lines))
 
 
 def _of_all_legs(robot: Robot, line: WireDraws, lines: Sequence[WireDraws], spread: bool) -> dict[str, Floats]:
@@ -218,8 +242,15 @@ def _reference_tension(line: WireDraws, lines: Sequence[WireDraws]) -> Any:
     return line.tension_ref_N
 
 
-def _typical(line: WireDraws, lines: Sequence[WireDraws]) -> Typical:
-    """What is typical of the tests of every leg's line: two numbers, or a leg's own where lines differ."""
+def typical_of_legs(line: WireDraws, lines: Sequence[WireDraws]) -> Typical:
+    """What is typical of the tests of every leg's line: two numbers, or a leg's own where lines differ.
+
+    Parameters
+    ----------
+    line : WireDraws
+    lines : sequence of WireDraws
+        As `lines_of` returned them.
+    """
     if any(one.typical != line.typical for one in line.others.values()):
         return Typical(*(_by_leg([one.typical[i] for one in lines]) for i in range(2)))
     return line.typical

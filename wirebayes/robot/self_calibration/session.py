@@ -16,9 +16,11 @@ from wirebayes.robot.mechanics.draws import (
     LENGTH_EXPONENT,
     WireDraws,
     differing,
+    differing_by,
     for_robot,
     lines_of,
     spread_of,
+    typical_of_legs,
 )
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion.creep import without_creep
@@ -155,12 +157,14 @@ class LengthPrior:
         legs = robot.legs
         first_own = legs + len(self.names)
         wires = self._without_specimens(robot, unknowns[:, legs:first_own])
-        theta = dict(wires.theta)
+        differs = {}
         for k, name in enumerate(self.own):
             start = first_own + k * legs
             deviation = unknowns[:, start : start + legs].T
             scale = self._specimen_scale(robot, name)
-            theta[name] = theta[name] * np.exp(scale * deviation)
+            differs[name] = np.exp(scale * deviation)
+        typical = typical_of_legs(self.line, lines_of(robot, self.line))
+        theta = dict(wires.theta) | differing_by(wires.theta, differs, typical)
         whole = replace(wires, theta=theta)
         if not self.creeps:
             whole = without_creep(whole)
