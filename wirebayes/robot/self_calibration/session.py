@@ -185,8 +185,12 @@ class LengthPrior:
 
     def _specimen_scale(self, robot: Robot, name: str) -> Floats:
         """(w, 1) how much more than `own_sd` the specimens of each leg's line differ."""
-        rms = []
-        for line in lines_of(robot, self.line):
+        rms: list[float] = []
+        lines = lines_of(robot, self.line)
+        for i, line in enumerate(lines):
+            if i and line is lines[i - 1]:  # as of most robots: this is asked at every step of a search
+                rms.append(rms[-1])
+                continue
             spread = spread_of(line, name, self.own_sd)
             rms.append(np.sqrt(np.mean(np.square(spread))))
         return np.array(rms)[:, None] / self.own_sd
