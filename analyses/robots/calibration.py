@@ -17,9 +17,13 @@ import numpy as np
 from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.self_calibration import observability
-from wirebayes.robot.self_calibration.estimate import corrected_joints, length_posterior
 from wirebayes.robot.self_calibration.predicted import predict_session
+from wirebayes.robot.self_calibration.residuals import misfit
+from wirebayes.robot.self_calibration.seeds import best, near_requests
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
+from wirebayes.robot.self_calibration.summary import summarised
+from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
+from wirebayes.robot.self_calibration.whole_answer import holds_of, joint_values_to
 
 TENSION_SD_N, REFERENCE_SD_M, SPREAD, LOWEST_N = 0.02, 5e-3, 0.05, 2.5
 POSES, CANDIDATES, TESTS = 10, 200, 6
@@ -39,6 +43,24 @@ def stand_in(rng, n=1000):
     )
 
 
+def choose_poses(change_N, count):
+    """Poses that together shrink the lengths' joint uncertainty most, chosen one after another."""
+    information = change_N.mT @ change_N / TENSION_SD_N**2
+    total = np.eye(change_N.shape[-1]) / REFERENCE_SD_M**2
+    chosen = []
+    for _ in range(count):
+        together = total + information
+        chosen.append(int(np.argmax(np.linalg.slogdet(together)[1])))
+        total = together[chosen[-1]]
+    return chosen
+
+
+def length_sd_m(change_N):
+    """(w,) standard deviations of the lengths, where tensions at poses change by so much a metre."""
+    information = (change_N.mT @ change_N).sum(0) / TENSION_SD_N**2
+    return np.sqrt(np.diag(np.linalg.inv(information + np.eye(len(information)) / REFERENCE_SD_M**2)))
+
+
 def plan(robot, line, rng):
     """The session: home, then the poses that shrink the lengths' uncertainty most; and random ones for comparison."""
     mean = draws.for_robot(robot, line.centre())
@@ -49,7 +71,7 @@ def plan(robot, line, rng):
     x, R, tau = x[good], R[good], tau[good]
     commands = inverse.commands(robot, mean, x, R, tau)
     change = observability.length_sensitivity(robot, mean, x, R, commands.zero_m, commands.offset_m)[1]
-    pick = observability.choose_poses(change, POSES, TENSION_SD_N, REFERENCE_SD_M)
+    pick = choose_poses(change, POSES)
     home = robot.home_m[None], rotation.matrix(robot.home_rotation_rad)[None]
     first = inverse.commands(robot, mean, *home, inverse.tensions(robot, *home)).joint_m
 
@@ -63,10 +85,8 @@ def plan(robot, line, rng):
             TENSION_SD_N,
         )
 
-    chosen = observability.observe(change[pick], TENSION_SD_N, REFERENCE_SD_M)
-    random = observability.observe(change[:POSES], TENSION_SD_N, REFERENCE_SD_M)
-    print(f"  {chosen.sentence}")
-    both = f"{1e3 * chosen.sd_m.mean():.3f} / {1e3 * random.sd_m.mean():.3f} mm"
+    chosen, random = (length_sd_m(change[rows]).mean() for rows in (pick, list(range(POSES))))
+    both = f"{1e3 * chosen:.3f} / {1e3 * random:.3f} mm"
     print(f"  sd of a length, chosen / {POSES} random poses: {both} (stiffness and creep known)")
     return session(np.array(pick))
 
@@ -79,13 +99,20 @@ def pose_error(robot, prior, truth, reached, joints, x, R):
     return 1e3 * np.linalg.norm(found.position_m - x, axis=1)
 
 
+def found_lengths(robot, prior, session, readings):
+    """What one robot's readings say of its lengths, all else but its wires exact."""
+    unknowns, sent = Unknowns(robot, prior, StatedErrors(joint_m=0.0)), holds_of(robot, session, readings)
+    holds = replace(sent, session=session.without_poses())
+    with np.errstate(all="ignore"):
+        return best(unknowns, holds, np.random.default_rng(0), about=near_requests(unknowns, sent))
+
+
 def study(name, line, count, rng):
     print(name)
     robot = schema.read_robot_file(name)
     robot = replace(robot, rule=replace(robot.rule, lowest_N=LOWEST_N))
     session = plan(robot, line, rng)
     prior = LengthPrior(line, REFERENCE_SD_M, SPREAD)
-    hooke = replace(prior, creeps=False)
     mean, cov = prior.moments(robot.legs)
     truth = rng.multivariate_normal(mean, cov, count)
     draw = rng.integers(line.count, size=count)
@@ -95,18 +122,18 @@ def study(name, line, count, rng):
     real = predict_session(robot, prior, session, truth, longest_step=0.35)
     readings = np.maximum(real.readings + rng.normal(size=real.readings.shape), 0.0)
     print(f"  readings of slack wires: {(real.readings == 0).mean():.3f} of all")
-    results = {
-        "creep model": (prior, length_posterior(robot, prior, session, readings)),
-        "Hooke only": (hooke, length_posterior(robot, hooke, session, readings)),
-    }
-    for label, (_, known) in results.items():
-        low, high = known.interval(0.9)
-        inside = ((low <= real.length_m) & (real.length_m <= high)).mean(1)
-        error = 1e3 * (known.length_m - real.length_m)
+    models = {"creep model": prior, "Hooke only": replace(prior, creeps=False)}
+    results = {label: [found_lengths(robot, one, session, read) for read in readings] for label, one in models.items()}
+    for label, each in results.items():
+        length = [summarised(found).length_m for found in each]
+        mean, sd, half = (np.array(part) for part in zip(*length, strict=True))
+        inside = (np.abs(mean - real.length_m) <= half * sd).mean(1)
+        error = 1e3 * (mean - real.length_m)
         print(
-            f"  {label:12s} converged {known.converged.mean():.3f}  covers {inside.mean():.3f} +- "
-            f"{inside.std() / np.sqrt(count):.3f} (90 % asked)  sd {1e3 * known.length_sd_m.mean():.3f} mm  "
-            f"rmse {np.sqrt((error**2).mean()):.3f} mm  misfit {known.misfit.mean():.2f}"
+            f"  {label:12s} converged {np.mean([found.converged for found in each]):.3f}  "
+            f"covers {inside.mean():.3f} +- "
+            f"{inside.std() / np.sqrt(count):.3f} (90 % asked)  sd {1e3 * sd.mean():.3f} mm  "
+            f"rmse {np.sqrt((error**2).mean()):.3f} mm  misfit {np.mean([misfit(found) for found in each]):.2f}"
         )
     tests = rng.uniform(robot.lower_m, robot.upper_m, (TESTS, 3))
     labels = "before, Hooke", "before, creep foreseen", "after, Hooke only", "after, creep model"
@@ -122,7 +149,7 @@ def study(name, line, count, rng):
         ahead = inverse.commands(robot, prior.wires(robot, centre)[0], x[None], R[None], tau, foreseen.creep.T)
         commands = {"before, Hooke": plain.joint_m, "before, creep foreseen": ahead.joint_m}
         for label, key in (("after, Hooke only", "Hooke only"), ("after, creep model", "creep model")):
-            commands[label] = corrected_joints(robot, results[key][0], results[key][1], x, R)
+            commands[label] = np.array([joint_values_to(found, x, R) for found in results[key]])
         for label, joints in commands.items():
             errors[label].append(pose_error(robot, prior, truth, real, joints, x, R))
     for label, values in errors.items():

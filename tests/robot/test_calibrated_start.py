@@ -6,12 +6,13 @@ import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import resources
-from typing import NamedTuple
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import wirebayes as wb
+from tests.robot.found_lengths import found_lengths
 from tests.robot.test_commands import fitted, session_csv  # noqa: F401 - fixtures
 from tests.robot.test_history import _joint_values_for, _line, _simulated, _theta
 from wirebayes.cli import main
@@ -29,8 +30,9 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.motion.creep import fresh
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated, from_dict, to_dict
-from wirebayes.robot.self_calibration.estimate import length_posterior
+from wirebayes.robot.self_calibration.equations import State
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
+from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
 
 HOLD_S, SOON_S = 40.0, 1e-3
 ERRORS = Uncertain(4e-3, 0.05, 0.01)
@@ -56,9 +58,9 @@ def case():
         places, level, whole.joint_m[:-2:2], np.full(len(places), HOLD_S), np.ones(len(places), bool), 0.01
     )
     prior = LengthPrior(line, ERRORS.reference_m, ERRORS.spread)
-    known = length_posterior(robot, prior, session, reads.ravel()[None] / 0.01)
-    assert known.converged.all()
-    start = calibrated(robot, prior, session, known)
+    known = found_lengths(robot, prior, session, reads.ravel() / 0.01)
+    assert known.converged
+    start = calibrated(known, session)
     after = History(times[-2:], whole.joint_m[-2:], None, None, np.zeros(2), np.zeros((2, 3)))
     return Case(
         robot,
@@ -140,18 +142,15 @@ def test_what_is_stored_is_what_is_known(case):
 
 def test_biases_are_averaged_over(case):
     prior = replace(case.start.prior, bias_sd_N=0.1)
-    d = len(prior.moments(4)[0])
-    known = calibrated(case.robot, prior, case.start.session, Known(np.arange(d)[None], np.eye(d)[None]))
-    np.testing.assert_array_equal(known.mean, np.arange(d - 4))
+    given = Unknowns(case.robot, prior, StatedErrors(joint_m=0.0))
+    mean, root = given.moments
+    d, session = len(mean), case.start.session
+    white = np.linalg.solve(root, np.arange(d) - mean)
+    state = State(white, session.position_m, session.rotation, session.joint_m)
+    known = calibrated(SimpleNamespace(unknowns=given, state=state, covariance=np.eye(d)), session)
+    np.testing.assert_allclose(known.mean, np.arange(d - 4), atol=1e-9)
     assert known.covariance.shape == (d - 4, d - 4)
     assert unknowns(case.robot, case.line, replace(ERRORS, calibrated=known), np.random.default_rng(0)).count == d - 4
-
-
-class Known(NamedTuple):
-    """As much of a calibration as is read."""
-
-    unknowns: Floats
-    covariance: Floats
 
 
 def _run_live(wires, usable, unusable, joint):

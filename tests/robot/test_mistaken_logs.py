@@ -15,9 +15,7 @@ from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration import answer, estimate, holding
 from wirebayes.robot.self_calibration.mistaken import tension_notices
-from wirebayes.robot.self_calibration.session import LengthPrior
 from wirebayes.robot.self_calibration.session_file import POSITION, TURN, may_be_empty, parse_session
 from wirebayes.strict.columns import columns_table
 from wirebayes.strict.table import csv_table
@@ -196,25 +194,6 @@ def test_a_slack_wire_may_read_below_zero_by_noise(session, below, refused):
         _read(robot, slack, biased=True)
     else:
         assert _read(robot, slack)[1].min() == pytest.approx(-below)
-
-
-def test_a_search_is_given_up_where_the_readings_are_absurd(session, monkeypatch):
-    """Tensions of five times the weight, up and down at random: no step leads anywhere."""
-    robot, cells = session
-    read, values = _read(robot, {name: column[:2] for name, column in cells.items()})
-    absurd = np.abs(np.random.default_rng(2).normal(0.0, 5.0 * 12.0 * 9.81 / SD_N, values.shape))
-    monkeypatch.setattr(holding, "_MOST", 3)  # steps of a hold: a hundred that lead nowhere take a minute
-    predicted, made = [], estimate.predict_session
-    monkeypatch.setattr(estimate, "predict_session", lambda *given, **more: predicted.append(1) or made(*given, **more))
-    patient = estimate.PATIENT - 2
-    with np.errstate(all="ignore"):
-        known = estimate.length_posterior(robot, LengthPrior(LINE, 5e-3), read, absurd[None], patient)
-    assert not known.converged[0] and known.misfit[0] > estimate.GROSS
-    assert len(predicted) <= 2 * (patient + 3)
-    (said,) = answer._unsure(known, known)
-    assert said.kind == "not-converged" and "standard errors from what robot and wires allow" in said.text
-    near = replace(known, misfit=np.array([estimate.GROSS]))
-    assert "read more poses" in answer._unsure(near, near)[0].text
 
 
 @pytest.mark.parametrize(("holds", "refused"), [(2, False), (3, True)])

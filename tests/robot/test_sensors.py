@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from wirebayes.robot.self_calibration import answer, sensors
+from wirebayes.robot.self_calibration import sensors
 from wirebayes.robot.self_calibration.sensors import sensor_notices, sensors_json, weighed
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 
@@ -106,29 +106,13 @@ def test_at_a_single_hold_no_sensor_is_looked_at(read, looked_at, monkeypatch):
     assert len(began) == looked_at
 
 
-@pytest.mark.parametrize(("read", "times", "wires"), [(2, 0.99, []), (2, 1.01, [2]), (1, 1.01, None)])
-def test_with_exact_geometry_a_sensor_is_named_from_the_same_level_and_holds_on(read, times, wires, monkeypatch):
-    """Lengths alone are unknown there; the sensors' errors stand last among the unknowns."""
-    size = np.sqrt(times * chi2.isf(SIGNIFICANT, 4))
-    bias, covariance = _estimate(size * np.eye(4)[2], np.eye(4))
-    whole = np.eye(9)
-    whole[5:, 5:] = covariance
-
-    def calibrated(robot, prior, session, readings, patience):
-        assert prior.bias_sd_N == PRIOR_N  # as much as a sensor ever read
-        unknowns = np.concatenate([np.full(5, 7.0), bias])
-        ended = {"converged": np.array([True]), "misfit": np.array([left]), "p_joint": np.array([SIGNIFICANT / 2])}
-        return SimpleNamespace(unknowns=unknowns[None], covariance=whole[None], **ended)
-
-    monkeypatch.setattr(answer, "length_posterior", calibrated)
-    monkeypatch.setattr(answer, "replace", lambda prior, **changed: SimpleNamespace(**{**vars(prior), **changed}))
-    session = SimpleNamespace(read=np.arange(3) < read, tension_sd_N=0.5)
-    readings = np.full(4 * read + 3, PRIOR_N / 0.5)
-    readings[4 * read :] = 1e6  # of an inclinometer, which comes after the tensions
-    known = SimpleNamespace(misfit=np.array([100.0]))
-    robot, left = SimpleNamespace(legs=4), 19.9
-    found = answer._at_fault(robot, SimpleNamespace(bias_sd_N=0.0), session, readings, known)
-    assert wires is None if found is None else found.wires == wires
-    assert answer._at_fault(robot, SimpleNamespace(bias_sd_N=1.0), session, readings, known) is None
-    left = 20.1  # sensors explain less than four fifths of what contradicts
-    assert answer._at_fault(robot, SimpleNamespace(bias_sd_N=0.0), session, readings, known) is None
+@pytest.mark.parametrize("joint_m", [0.0, 1e-3, None])
+@pytest.mark.parametrize(("p", "left", "little"), [(0.0099, 0.201, True), (0.0099, 0.199, False), (0.0101, 0.9, False)])
+def test_sensors_that_explain_less_than_four_fifths_are_not_blamed(p, left, little, joint_m, monkeypatch):
+    """Where the error of the joint values is estimated it takes up what contradicts, and a ratio says nothing."""
+    monkeypatch.setattr(sensors, "trust", lambda found: found.p)
+    monkeypatch.setattr(sensors, "misfit", lambda found: found.misfit)
+    errors = SimpleNamespace(joint_m=joint_m)
+    found = SimpleNamespace(misfit=100.0, unknowns=SimpleNamespace(errors=errors))
+    other = SimpleNamespace(p=p, misfit=100.0 * left)
+    assert sensors._explain_little(found, other) is (little and joint_m is not None)

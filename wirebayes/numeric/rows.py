@@ -38,19 +38,6 @@ def rows_of(record: Record, rows: Any) -> Record:
     return replace(record, **{f.name: getattr(record, f.name)[rows] for f in fields(record)})
 
 
-def chosen_records(first: Bools, one: Record, other: Record) -> Record:
-    """A dataclass of arrays ``(n, ...)`` made of the rows of two others, each row from one or from the other.
-
-    Parameters
-    ----------
-    first : (n,) bool array
-        True where the row is of `one`.
-    one, other : dataclasses of one kind
-    """
-    chosen = {f.name: chosen_rows(first, getattr(one, f.name), getattr(other, f.name)) for f in fields(one)}
-    return replace(one, **chosen)
-
-
 def put_rows(out: Record, rows: Any, found: Record) -> None:
     """Put the rows of a dataclass of arrays ``(k, ...)`` in place of others, by number or mask.
 

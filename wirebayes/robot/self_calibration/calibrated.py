@@ -12,7 +12,7 @@ from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.rotation import matrix, vector
 from wirebayes.robot.motion.creep import CreepState
 from wirebayes.robot.self_calibration import predicted
-from wirebayes.robot.self_calibration.estimate import LengthPosterior
+from wirebayes.robot.self_calibration.posterior import Whole
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
 
@@ -47,20 +47,23 @@ class Calibrated:
         return predicted.carried(self.robot, self.prior, self.session, unknowns)
 
 
-def calibrated(robot: Robot, prior: LengthPrior, session: Session, known: LengthPosterior) -> Calibrated:
-    """What the calibration of one robot leaves known.
+def calibrated(found: Whole, session: Session) -> Calibrated:
+    """What a calibration leaves known of references, wires and specimens, for a history on the calibrated robot.
 
     Parameters
     ----------
-    robot : Robot
-    prior : LengthPrior
+    found : Whole
+        Biases of its sensors, and its geometry, are averaged over.
     session : Session
-    known : estimate.LengthPosterior
-        Of one robot. Biases of its sensors are averaged over.
     """
-    own = replace(prior, bias_sd_N=0.0)
-    d = len(own.moments(robot.legs)[0])
-    return Calibrated(robot, own, session, known.unknowns[0, :d], known.covariance[0, :d, :d])
+    unknowns, state = found.unknowns, found.state
+    _, root = unknowns.moments
+    at = unknowns.slices["wires"]
+    own = replace(unknowns.prior, bias_sd_N=0.0)
+    d = len(own.moments(unknowns.robot.legs)[0])
+    covariance = root @ found.covariance[at, at] @ root.T
+    there = replace(session, position_m=state.position_m, rotation=state.rotation)
+    return Calibrated(unknowns.robot, own, there, unknowns.parts(state.white).wires[:d], covariance[:d, :d])
 
 
 def to_dict(found: Calibrated) -> CalibratedUnknowns:

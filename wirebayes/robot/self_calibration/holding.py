@@ -27,9 +27,8 @@ _POWERS = 0.1, 3.0  # of time, between which a first step is shortened; unknowns
 
 @dataclass(frozen=True)
 class SessionHold:
-    """A hold of the session: the poses at its beginning and end, lengths before creep, and what is carried out."""
+    """A hold of the session: the poses at its end, lengths before creep, and what is carried out."""
 
-    begun: forward.Equilibria
     here: forward.Equilibria
     bare_m: Floats
     state: CreepState
@@ -50,7 +49,6 @@ def holds(
     session: Session,
     resolved_N: float,
     longest_step: float = LONGEST,
-    near: Poses | None = None,
 ) -> Iterator[SessionHold]:
     """Every hold of a session, in order.
 
@@ -66,26 +64,16 @@ def holds(
         What is resolved of a tension: steps err by a small share of it.
     longest_step : float
         Longest step in the logarithm of time between tension updates; the first is a thousandth of the hold.
-    near : (n, p, 3), (n, p, 3, 3) arrays, optional
-        Where the holds are known to begin, about; default: the requested poses.
     """
     n, legs = error_m.shape
     state, pace = fresh(legs, n), _Pace(_FIRST, longest_step)
-    starts = _starts(session, near)
+    starts = zip(session.position_m, session.rotation, strict=True)
     for joint, duration, start in zip(session.joint_m, session.duration_s, starts, strict=True):
         bare, offset = inverse.lengths(robot, np.broadcast_to(joint, (n, legs)))
         walk = _Walk(robot, wires, (bare + error_m, offset), start, state, resolved_N)
-        begun = walk.here
         walk.through(float(duration), pace, longest_step)
         state = walk.creep.state()
-        yield SessionHold(begun, walk.here, walk.bare, state)
-
-
-def _starts(session: Session, near: Poses | None) -> list[Poses]:
-    """Where the solutions of every hold start from."""
-    if near is None:
-        return list(zip(session.position_m, session.rotation, strict=True))
-    return list(zip(near[0].swapaxes(0, 1), near[1].swapaxes(0, 1), strict=True))
+        yield SessionHold(walk.here, walk.bare, state)
 
 
 class _Walk:

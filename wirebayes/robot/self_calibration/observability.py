@@ -1,6 +1,4 @@
-"""What tension readings determine about zero-tension lengths: sensitivities, rank, a sentence, and better poses."""
-
-from dataclasses import dataclass
+"""How equilibria answer when wires change: small motions and tensions, by zero-tension lengths."""
 
 import numpy as np
 
@@ -10,7 +8,6 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires, tension
-from wirebayes.sentences import short
 
 
 def response(
@@ -77,119 +74,3 @@ def length_sensitivity(
     """
     motion, change, by_zero = response(robot, wires, position_m, rotation, zero_m, offset_m)
     return motion * by_zero[:, None], change * by_zero[:, None]
-
-
-@dataclass(frozen=True)
-class Observability:
-    """The combinations of lengths that the readings show.
-
-    Attributes
-    ----------
-    rank : int
-        Combinations whose standard error is below a tenth of the prior one.
-    sd_m : (w,) array
-        Standard error of each length given prior and readings.
-    weakest : (w,) array
-        Unit combination that the readings show least.
-    weakest_sd_m : float
-        Its standard error from the readings alone.
-    sentence : str
-    """
-
-    rank: int
-    sd_m: Floats
-    weakest: Floats
-    weakest_sd_m: float
-    sentence: str
-
-
-def observe(
-    change_N: Floats, tension_sd_N: float, prior_sd_m: float, bias_sd_N: float = 0.0, sign: Floats | None = None
-) -> Observability:
-    """Observability of the lengths from tensions at several poses.
-
-    Parameters
-    ----------
-    change_N : (p, w, w) array
-        From `length_sensitivity`, a pose a row.
-    tension_sd_N : float
-    prior_sd_m : float
-    bias_sd_N : float
-        Of a bias of each sensor, which the readings show only against each other.
-    sign : (p, w) array, optional
-        How the bias enters each reading; default: as a constant.
-    """
-    legs = change_N.shape[-1]
-    if sign is None:
-        sign = np.ones(change_N.shape[:2])
-    information = _information(change_N, tension_sd_N, bias_sd_N, sign)
-    if not np.isfinite(information).all():
-        sentence = "What the readings show cannot be computed at these poses: nothing holds the platform there."
-        return Observability(0, np.full(legs, prior_sd_m), np.full(legs, np.nan), np.inf, sentence)
-    return _observed(information, prior_sd_m)
-
-
-def _observed(information: Floats, prior_sd_m: float) -> Observability:
-    """Observability by what the readings say of the lengths, ``(w, w)``, 1/m²."""
-    values, vectors = np.linalg.eigh(information)
-    alone = 1.0 / np.sqrt(np.maximum(values, 1e-300))
-    rank = int((alone < 0.1 * prior_sd_m).sum())
-    # by eigenvectors: where some combinations are known absurdly well, information and prior have no inverse in floats
-    total = np.maximum(values, 0.0) + prior_sd_m**-2
-    sd = np.sqrt((vectors**2 / total).sum(axis=1))
-    weakest = _largest_positive(vectors[:, 0])
-    sentence = _sentence(rank, weakest, min(alone[0], prior_sd_m))
-    return Observability(rank, sd, weakest, float(alone[0]), sentence)
-
-
-def _largest_positive(direction: Floats) -> Floats:
-    """The direction or its opposite, whose largest component is positive."""
-    largest = direction[np.argmax(np.abs(direction))]
-    return direction * np.sign(largest)
-
-
-def _information(change_N: Floats, tension_sd_N: float, bias_sd_N: float, sign: Floats) -> Floats:
-    """What readings of all poses say of the lengths, their constant or signed biases eliminated: ``(w, w)``, 1/m²."""
-    information = (change_N.mT @ change_N).sum(0) / tension_sd_N**2
-    if bias_sd_N > 0:
-        mixed = (sign[:, :, None] * change_N).sum(0) / tension_sd_N**2
-        own = (sign**2).sum(0) / tension_sd_N**2 + 1.0 / bias_sd_N**2
-        information = information - mixed.T @ (mixed / own[:, None])
-    return information
-
-
-def _sentence(rank: int, weakest: Floats, known_m: float) -> str:
-    parts = []
-    for i in np.argsort(-np.abs(weakest)):
-        if abs(weakest[i]) > 0.2:
-            parts.append(f"{weakest[i]:+.2f} of wire {i + 1}")
-    seen = f"The readings show {rank} of {len(weakest)} combinations of lengths to a tenth of their prior uncertainty"
-    return f"{seen}; least of all {', '.join(parts)}, known to {short(1e3 * known_m, 2)} mm."
-
-
-def choose_poses(change_N: Floats, count: int, tension_sd_N: float, prior_sd_m: float) -> list[int]:
-    """Poses that together shrink the lengths' joint uncertainty most, chosen one after another.
-
-    Parameters
-    ----------
-    change_N : (c, w, w) array
-        Sensitivities at candidate poses.
-    count : int
-
-    Returns
-    -------
-    list of int
-        Indices of candidates; a pose may be worth repeating.
-    """
-    information = change_N.mT @ change_N / tension_sd_N**2
-    total = np.eye(change_N.shape[-1]) / prior_sd_m**2
-    chosen: list[int] = []
-    if not len(information):
-        return chosen
-    for _ in range(count):
-        together = total + information
-        _, gain = np.linalg.slogdet(together)
-        best = int(np.argmax(gain))
-        chosen.append(best)
-        total = together[best]
-    return chosen

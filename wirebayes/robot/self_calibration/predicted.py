@@ -27,10 +27,6 @@ class PredictedSession:
         Zero-tension lengths at the end, creep included; their creep strain.
     position_m, rotation : (n, q, 3), (n, q, 3, 3) arrays
         Pose at every reading.
-    begun_m, begun_rotation : (n, p, 3), (n, p, 3, 3) arrays
-        Pose at the beginning of every hold.
-    ended_m, ended_rotation : (n, p, 3), (n, p, 3, 3) arrays
-        Pose at the end of every hold.
     read_length_m : (n, q, w) array
         Zero-tension lengths at every reading.
     solved : (n,) bool array
@@ -41,10 +37,6 @@ class PredictedSession:
     creep: Floats
     position_m: Floats
     rotation: Floats
-    begun_m: Floats
-    begun_rotation: Floats
-    ended_m: Floats
-    ended_rotation: Floats
     read_length_m: Floats
     solved: Bools
 
@@ -55,7 +47,6 @@ def predict_session(
     session: Session,
     unknowns: Floats,
     longest_step: float = LONGEST,
-    near: Poses | None = None,
 ) -> PredictedSession:
     """Run the session for every row of unknowns ``(n, d)``: every creep step under the tensions it meets.
 
@@ -67,32 +58,26 @@ def predict_session(
     unknowns : (n, d) array
     longest_step : float
         Longest step in the logarithm of time between tension updates; the first is a thousandth of the hold.
-    near : (n, p, 3), (n, p, 3, 3) arrays, optional
-        Where the holds are known to begin, about; default: the requested poses.
     """
     wires, error = prior.wires(robot, unknowns)
     bias = prior.bias_N(robot.legs, unknowns)
-    begun, ended, read, tensions, lengths = [], [], [], [], []
-    for k, hold in enumerate(holds(robot, wires, error, session, session.tension_sd_N, longest_step, near)):
+    solved, read, tensions, lengths = [], [], [], []
+    for k, hold in enumerate(holds(robot, wires, error, session, session.tension_sd_N, longest_step)):
         strain = hold.state.strain(wires).T
         length = hold.bare_m * (1 + strain)
-        begun.append(hold.begun)
-        ended.append(hold.here)
+        solved.append(hold.here.found)
         if session.read[k]:
             tension = hold.here.tension_N + bias * session.signs[k]
             read.append(hold.here)
             tensions.append(tension)
             lengths.append(length)
     position, turn = _poses(read)
-    solved = [here.found for here in ended]
     return PredictedSession(
         _standardised(session, np.concatenate(tensions, 1), turn),
         length,
         np.broadcast_to(strain, length.shape),
         position,
         turn,
-        *_poses(begun),
-        *_poses(ended),
         np.stack(lengths, 1),
         np.all(solved, axis=0),
     )

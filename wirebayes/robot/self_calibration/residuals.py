@@ -21,6 +21,7 @@ _FINEST = 1e-2  # of the usual error: no encoder with drum and wire does better
 # Of the span: loops that stay so far open belong to another robot, in another unit or another order. Layers on a drum
 # and a printer's anchors that are off by a decimetre leave less.
 _LOST = 0.01
+_CONTRADICTED = 1e2  # mean squared residual: readings ten standard errors off
 _EXPLAINED = 3.0  # times the stated error of a joint value: loops that are no further open say nothing of the robot
 
 
@@ -100,6 +101,11 @@ def misfit(found: Whole) -> float:
             read.append(e.residual[:, part][known])
     residuals = np.concatenate(read)
     return float(np.mean(residuals**2)) if residuals.size else 0.0
+
+
+def contradicted(found: Whole) -> bool:
+    """Whether what was read contradicts stated errors beyond doubt: of readings that may err more, nothing is known."""
+    return found.unknowns.errors.joint_m is not None and misfit(found) > _CONTRADICTED
 
 
 def length_rms_m(found: Whole) -> float:

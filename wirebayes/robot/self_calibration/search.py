@@ -94,7 +94,8 @@ def searched(
     if inexact and misfit(found) < _GROSS:
         # how far from exact the joint values are tells more than that there is no answer
         rough = replace(unknowns, errors=replace(unknowns.errors, joint_m=None))
-        found = best(rough, holds, rng, progress, "rough start", about)
+        other = best(rough, holds, rng, progress, "rough start", about)
+        found = other if other.converged or not found.converged else found
     return Searched(found, holds, p, at_fault, inexact, requested, too_good and not requested)
 
 

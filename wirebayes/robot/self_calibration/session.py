@@ -81,11 +81,6 @@ class Session:
         """(p, w) How the bias enters a tension that is read."""
         return np.ones_like(self.joint_m) if self.motion is None else self.motion
 
-    @property
-    def bias_sign(self) -> Floats:
-        """(q, w) How the bias enters the tensions that were read."""
-        return self.signs[self.read]
-
 
 @dataclass(frozen=True)
 class LengthPrior:

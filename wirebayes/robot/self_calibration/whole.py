@@ -19,6 +19,7 @@ from wirebayes.robot.self_calibration.holds_creep import ROUGHLY, creep_of
 from wirebayes.robot.self_calibration.linearisation import linearised
 from wirebayes.robot.self_calibration.posterior import Whole, gaussian_posterior
 from wirebayes.robot.self_calibration.residuals import (
+    contradicted,
     joint_error,
     length_rms_m,
     lengths_tell,
@@ -122,8 +123,8 @@ class _Search:
         About which creep was taken.
     rounds : list of (2,) arrays
         Logarithms of the noises that were thought, and of those that the residuals then showed.
-    opened_m : list of float
-        How far loops were open after each round.
+    opened_m, costs : lists of float
+        How far loops were open after each round, and the sum of squares.
     came_down : bool
         Whether the last descent ended at a least sum of squares, not for want of steps.
     each : bool
@@ -138,6 +139,7 @@ class _Search:
         self.came_down = self.each = False
         self.rounds: list[tuple[Floats, Floats]] = []
         self.opened_m: list[float] = []
+        self.costs: list[float] = []
         self.last_m, _ = inverse.lengths(unknowns.robot, holds.session.joint_m[-1])
         self.usual = usual_joint(unknowns.robot, holds)
         read = np.isfinite(holds.tension_N).any()
@@ -169,10 +171,16 @@ class _Search:
                 return found
             self.opened_m.append(length_rms_m(found))
             hopeless_m = most_open_m(found, _HOPELESS)
-            if _given_up(self.opened_m, hopeless_m, lost_m(found)):
+            if _given_up(self.opened_m, hopeless_m, lost_m(found)) or self._contradicted(found):
                 break
             self._go_on(found, sd, moved_on)
         return replace(found, converged=False)
+
+    def _contradicted(self, found: Whole) -> bool:
+        """Whether rounds come no nearer to readings that contradict what is stated: of no use is where they end."""
+        self.costs.append(found.cost)
+        before, since = self.costs[:-_STALLED], self.costs[-_STALLED:]
+        return bool(before) and contradicted(found) and min(since) > _NEARER * min(before)
 
     def _round(self) -> Whole:
         """The posterior with creep about the last state, and the noise that its residuals show."""

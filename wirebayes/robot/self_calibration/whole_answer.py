@@ -13,25 +13,26 @@ from wirebayes.json_files.calibrate import (
     IdentifiedJson,
     JointErrors,
     ObservabilityJson,
+    PoseNow,
 )
 from wirebayes.numeric.typing import Floats
 from wirebayes.progress import Progress, silent
 from wirebayes.result_warnings import Notice, to_json
-from wirebayes.robot.mechanics import rotation
+from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.sag import sag_warnings_of_poses
+from wirebayes.robot.mechanics.winches import of_each_winch
 from wirebayes.robot.mechanics.wire_doubts import doubts
 from wirebayes.robot.motion import home, inverse, plausible
 from wirebayes.robot.self_calibration import sensors
-from wirebayes.robot.self_calibration.calibrated import Calibrated
+from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
 from wirebayes.robot.self_calibration.equations import Holds, moved
 from wirebayes.robot.self_calibration.identified import Identified, identified, weakest_in_words
 from wirebayes.robot.self_calibration.mistaken import column_notices, tension_notices
 from wirebayes.robot.self_calibration.next_poses import NextPoses, next_poses
 from wirebayes.robot.self_calibration.open_where import contradicted_requests, most_open, odd_hold
 from wirebayes.robot.self_calibration.posterior import Whole
-from wirebayes.robot.self_calibration.report_parts import estimated_lengths, pose_and_home, with_biases
-from wirebayes.robot.self_calibration.residuals import length_rms_m, lost, misfit, trust
+from wirebayes.robot.self_calibration.residuals import contradicted, length_rms_m, lost, misfit, trust
 from wirebayes.robot.self_calibration.search import Searched, StatedPoses, searched
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import Summary, summarised
@@ -141,7 +142,7 @@ def calibration_report(
             ]
         ),
     }
-    return WholeAnswer(content, moved(robot, found.unknowns.parts(found.state.white)), _known(found, session))
+    return WholeAnswer(content, moved(robot, found.unknowns.parts(found.state.white)), calibrated(found, session))
 
 
 @dataclass(frozen=True)
@@ -172,7 +173,7 @@ class _Verdict:
 
 
 def _prior(prior: LengthPrior, errors: StatedErrors, session: Session) -> CalibrationPrior:
-    given: CalibrationPrior = {
+    known: CalibrationPrior = {
         "reference_sd_mm": 1e3 * prior.reference_sd_m,
         "specimen_spread": prior.spread,
         "anchor_sd_mm": 1e3 * errors.exit_m,
@@ -180,7 +181,10 @@ def _prior(prior: LengthPrior, errors: StatedErrors, session: Session) -> Calibr
         "pose_sd_mm": 1e3 * errors.pose_m,
         "drum_sd": errors.drum,
     }
-    return with_biases(given, prior, session)
+    if prior.bias_sd_N > 0:
+        known["tension_bias_sd_N"] = prior.bias_sd_N
+        known["tension_bias_sign"] = "constant" if session.motion is None else "motion"
+    return known
 
 
 def _poses(s: Summary, session: Session) -> EstimatedPoses:
@@ -189,15 +193,18 @@ def _poses(s: Summary, session: Session) -> EstimatedPoses:
 
 
 def _lengths(found: Whole, s: Summary, p_joint: float) -> EstimatedLengths:
-    return estimated_lengths(
-        converged=found.converged,
-        misfit=misfit(found),
-        p_joint=p_joint,
-        length_m=s.length_m,
-        creep=s.strain,
-        reference_m=s.reference_m,
-        bias_N=s.bias_N if found.unknowns.prior.bias_sd_N > 0 else None,
-    )
+    reference = s.reference_m
+    known: EstimatedLengths = {
+        "converged": found.converged,
+        "misfit": misfit(found),
+        "p_joint": p_joint,
+        "length_m": interval_about(*s.length_m),
+        "creep_strain": s.strain,
+        "reference_error_mm": {"mean": 1e3 * reference.mean, "sd": 1e3 * reference.sd},
+    }
+    if found.unknowns.prior.bias_sd_N > 0:
+        known["tension_bias_N"] = {"mean": s.bias_N.mean, "sd": s.bias_N.sd}
+    return known
 
 
 def _by_hooke_alone(found: Whole, holds: Holds, prior: LengthPrior, progress: Progress) -> EstimatedLengths:
@@ -242,22 +249,41 @@ def _now(robot: Robot, found: Whole, s: Summary, usable: bool) -> CalibratedPose
     """Where the platform is after the last hold; joint values of the home pose where they can be used."""
     if not found.converged:
         return {"pose_now": None, "joint_values_for_home_m": None}
-    joint = np.full(robot.legs, np.nan)
-    if usable:
-        joint = _joint_values_for_home(robot, found, s)
-    return pose_and_home(robot, s.position_m.mean[-1], s.turn_rad.mean[-1], joint)
+    pose: PoseNow = {"position_m": s.position_m.mean[-1], "rotation_vector_rad": s.turn_rad.mean[-1]}
+    now: CalibratedPoses = {"pose_now": pose, "joint_values_for_home_m": None}
+    if not usable:  # nobody should send the robot there
+        return now
+    joint_m = joint_values_to(found, robot.home_m, rotation.matrix(robot.home_rotation_rad))
+    if not np.isfinite(joint_m).all():  # nothing holds the home pose
+        return now
+    now["joint_values_for_home_m"] = of_each_winch(robot, joint_m)
+    if robot.drums is not None:
+        now["motor_angles_for_home_rad"] = of_each_winch(robot, drums.motor_angle(robot.drums, joint_m))
+    return now
 
 
-def _joint_values_for_home(robot: Robot, found: Whole, s: Summary) -> Floats:
-    """(w,) The joint values that bring the platform to its home pose, by the geometry that was found."""
+def joint_values_to(found: Whole, position_m: Floats, turn: Floats) -> Floats:
+    """Joint values that bring the platform to a pose after the session, by the robot that was found.
+
+    Parameters
+    ----------
+    found : Whole
+    position_m, turn : (3,), (3, 3) arrays
+        The pose.
+
+    Returns
+    -------
+    (w,) array
+        m, of each leg; NaN where no tensions within the bounds hold the pose.
+    """
     unknowns = found.unknowns
     parts = unknowns.parts(found.state.white)
-    wires, _ = unknowns.prior.wires(robot, parts.wires[None])
-    there = moved(robot, parts)
-    home = robot.home_m[None], rotation.matrix(robot.home_rotation_rad)[None]
-    tau = inverse.tensions(there, *home)
-    strain, reference = s.strain[:, None], parts.reference_m[:, None]
-    return inverse.commands(there, wires, *home, tau, strain, reference).joint_m[0]
+    wires, _ = unknowns.prior.wires(unknowns.robot, parts.wires[None])
+    there = moved(unknowns.robot, parts)
+    pose = position_m[None], turn[None]
+    tau = inverse.tensions(there, *pose)
+    strain, reference = found.creep.strain[-1][:, None], parts.reference_m[:, None]
+    return inverse.commands(there, wires, *pose, tau, strain, reference).joint_m[0]
 
 
 def _warnings(verdict: _Verdict) -> list[Notice]:
@@ -301,11 +327,12 @@ def _warnings(verdict: _Verdict) -> list[Notice]:
 def _inexact(search: Searched) -> str:
     """What to do where joint values that are taken as exact contradict the rest."""
     found = search.found
-    if found.unknowns.errors.joint_m == 0:  # by more than an error of theirs explains
-        off = number(misfit(found) ** 0.5)
+    if found.unknowns.errors.joint_m == 0:  # no error of theirs explains it
         return (
-            f"the readings are {off} standard errors (root mean square) from what robot and wires allow: do not use "
-            "these values; check their units, the order of the columns, --tension-sd, and the robot's file"
+            "robot and wires do not explain the readings together with the reference lengths (joint test, "
+            f"{chance(search.p)}, mean squared residual {short(misfit(found), 3)}): do not use these values; check "
+            "exit and platform points, which are taken as exact, --wires, the readings' units and signs, their order, "
+            "--tension-sd and --reference-sd"
         )
     return (
         f"geometry, taken as exact, and joint values agree to {short(1e3 * found.noise.joint_m, 2)} mm only (joint "
@@ -323,6 +350,12 @@ def _columns(search: Searched) -> list[Notice]:
 def _not_converged(found: Whole, session: Session) -> str:
     """What to do about a search that found no mode."""
     if not lost(found):
+        if contradicted(found):
+            off = number(misfit(found) ** 0.5)
+            return (
+                f"the readings are {off} standard errors (root mean square) from what robot and wires allow; check "
+                "their units, the order of the columns, and the robot's file"
+            )
         return "read more poses, or check the readings and the stated errors"
     off_m = length_rms_m(found)
     off = f"{short(off_m, 2)} m (root mean square) from" if off_m < found.unknowns.robot.span_m else "not at all near"
@@ -330,15 +363,3 @@ def _not_converged(found: Whole, session: Session) -> str:
         f"the joint values are {off} what robot and stated errors allow{most_open(found, session)}; "
         "check their units and signs, the order of the columns, and the robot's file"
     )
-
-
-def _known(found: Whole, session: Session) -> Calibrated:
-    """The posterior of references, wires and specimens, for a history on the calibrated robot."""
-    unknowns, state = found.unknowns, found.state
-    parts, (_, root) = unknowns.parts(state.white), unknowns.moments
-    at = unknowns.slices["wires"]
-    own = replace(unknowns.prior, bias_sd_N=0.0)
-    d = len(own.moments(unknowns.robot.legs)[0])
-    covariance = root @ found.covariance[at, at] @ root.T
-    there = replace(session, position_m=state.position_m, rotation=state.rotation)
-    return Calibrated(unknowns.robot, own, there, parts.wires[:d], covariance[:d, :d])
