@@ -176,7 +176,7 @@ def test_readings_that_nothing_explains_end_unconverged(
     results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A tension beyond all strength: matrices are singular or overflow."""
-    monkeypatch.setattr("wirebayes.robot.self_calibration.whole._ROUNDS", 8)  # sixty that lead nowhere take long
+    monkeypatch.setattr("wirebayes.robot.self_calibration.estimate._ROUNDS", 8)  # sixty that lead nowhere take long
     header, first, second = SESSION.read_text().splitlines()[:3]
     columns = zip(header.split(","), second.split(","), strict=True)
     cells = ["9e8" if key == "tension_1_N" else cell for key, cell in columns]

@@ -17,13 +17,13 @@ import numpy as np
 from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.self_calibration import observability
+from wirebayes.robot.self_calibration.answer import holds_of, joint_values_to
 from wirebayes.robot.self_calibration.predicted import predict_session
 from wirebayes.robot.self_calibration.residuals import misfit
 from wirebayes.robot.self_calibration.seeds import best, near_requests
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import summarised
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
-from wirebayes.robot.self_calibration.whole_answer import holds_of, joint_values_to
 
 TENSION_SD_N, REFERENCE_SD_M, SPREAD, LOWEST_N = 0.02, 5e-3, 0.05, 2.5
 POSES, CANDIDATES, TESTS = 10, 200, 6

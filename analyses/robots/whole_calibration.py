@@ -31,6 +31,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.tensions import nearest
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration import (
+    answer,
     descent,
     equations,
     holds_creep,
@@ -38,7 +39,6 @@ from wirebayes.robot.self_calibration import (
     predicted,
     residuals,
     session,
-    whole_answer,
 )
 from wirebayes.robot.self_calibration.identified import identified
 from wirebayes.robot.self_calibration.linearisation import linearised
@@ -174,7 +174,7 @@ def _cases(
             yield asked, one
 
 
-def _verdict(found: posterior.Whole) -> bool:
+def _verdict(found: posterior.RobotPosterior) -> bool:
     seen = identified(found)
     return found.converged and residuals.trust(found) >= SIGNIFICANT and (seen.determined > 0 or seen.of == 0)
 
@@ -250,9 +250,7 @@ def exact(size: int, seed: int) -> Iterator[dict[str, Any]]:
         readings = (one.holds.tension_N / log.tension_sd_N).ravel()
         with np.errstate(all="ignore"):
             poses = StatedPoses.REQUESTED if asked.stops == FEW else StatedPoses.MEASURED
-            found = whole_answer.calibration_report(
-                robot, one.told.prior, errors, log, readings, seed, poses, 0
-            ).content
+            found = answer.calibration_report(robot, one.told.prior, errors, log, readings, seed, poses, 0).content
             power = _power(one, errors, _unplaced(log) if asked.stops == FEW else log) if asked.anchor else 0.0
         yield {
             "kind": asked.kind,
@@ -387,9 +385,7 @@ def sensors(size: int, seed: int) -> Iterator[dict[str, Any]]:
         begun = time.process_time()
         with np.errstate(all="ignore"):
             told = one.told
-            found = whole_answer.calibration_report(
-                robot, told.prior, told.errors, log, readings, seed, visits=0
-            ).content
+            found = answer.calibration_report(robot, told.prior, told.errors, log, readings, seed, visits=0).content
         said = found["sensors_at_fault"]
         yield {
             "kind": asked.kind,
@@ -412,7 +408,7 @@ def sensors_of(rows: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def _held(found: posterior.Whole, one: Case) -> dict[str, float]:
+def _held(found: posterior.RobotPosterior, one: Case) -> dict[str, float]:
     """Shares of the 90 % intervals that hold the truth; none where nothing was found."""
     if not found.converged:
         return {}

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.self_calibration.posterior import Whole
+from wirebayes.robot.self_calibration.answer import holds_of
+from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.seeds import best, near_requests
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
-from wirebayes.robot.self_calibration.whole_answer import holds_of
 
 
-def found_lengths(robot: Robot, prior: LengthPrior, session: Session, readings: np.ndarray) -> Whole:
+def found_lengths(robot: Robot, prior: LengthPrior, session: Session, readings: np.ndarray) -> RobotPosterior:
     """The posterior for readings ``(r,)``, standardised."""
     unknowns = Unknowns(robot, prior, StatedErrors(joint_m=0.0))
     sent = holds_of(robot, session, readings)

@@ -12,11 +12,11 @@ from tests.robot.test_commands import fitted, session_csv  # noqa: F401
 from wirebayes.commands.calibrate import calibrate
 from wirebayes.commands.wires import robot_of
 from wirebayes.robot.mechanics.draws import WireDraws
-from wirebayes.robot.self_calibration import descent, open_where, residuals, session_file, whole
+from wirebayes.robot.self_calibration import descent, estimate, open_where, residuals, session_file
+from wirebayes.robot.self_calibration.answer import calibration_report
 from wirebayes.robot.self_calibration.search import StatedPoses
 from wirebayes.robot.self_calibration.session import LengthPrior
 from wirebayes.robot.self_calibration.unknowns import StatedErrors
-from wirebayes.robot.self_calibration.whole_answer import calibration_report
 from wirebayes.strict.columns import columns_table
 
 FIELD = Path(__file__).parent / "field" / "calibrate-wrong-anchors"
@@ -46,7 +46,7 @@ def _calibrated(holds=None, errors=ROUGH, changed=lambda log: log, **options):
 def test_a_log_that_fits_nothing_ends_early_and_says_how_far_off_it_is(monkeypatch):
     """Without an end to hopeless searches it took 6700 linearisations; a log of the printer's own takes 3400."""
     count, said = [], []
-    for module in (descent, whole):
+    for module in (descent, estimate):
         monkeypatch.setattr(module, "linearised", _counted(module.linearised, count))
     found = _calibrated(progress=lambda name, done, total: said.append((name, done / total)))
     assert len(count) < 1500
@@ -60,7 +60,7 @@ def test_a_log_that_fits_nothing_ends_early_and_says_how_far_off_it_is(monkeypat
 
 def test_the_share_of_a_part_never_falls(monkeypatch):
     """Where exact joint values fit nothing, all starts come again with rough ones."""
-    monkeypatch.setattr(whole, "_ROUNDS", 3)
+    monkeypatch.setattr(estimate, "_ROUNDS", 3)
     said = {}
     _calibrated(
         4, replace(ROUGH, joint_m=0.0), progress=lambda name, done, total: said.setdefault(name, []).append(done)
@@ -85,9 +85,9 @@ def test_a_search_is_given_up_where_loops_are_further_open_than_the_robot_or_its
     monkeypatch, share, stated, rounds
 ):
     """A tenth of the robot, or three times the stated error of the joint values."""
-    monkeypatch.setattr(whole, "_ROUNDS", 8)
-    monkeypatch.setattr(whole, "_STILL", 0.0)  # no round is the last by itself
-    monkeypatch.setattr(whole, "length_rms_m", lambda found: share * found.unknowns.robot.span_m)
+    monkeypatch.setattr(estimate, "_ROUNDS", 8)
+    monkeypatch.setattr(estimate, "_STILL", 0.0)  # no round is the last by itself
+    monkeypatch.setattr(estimate, "length_rms_m", lambda found: share * found.unknowns.robot.span_m)
     shares, robot = [], robot_of(FIELD / "hp4-rough.toml")
     whole_wire = robot.span_m / np.sqrt(np.mean(1 / robot.lines**2))  # of each line no more than its part is open
     errors = replace(ROUGH, joint_m=stated and stated * whole_wire)
@@ -110,7 +110,7 @@ def test_a_search_is_given_up_where_loops_are_further_open_than_the_robot_or_its
     ],
 )
 def test_a_search_whose_loops_come_no_tenth_nearer_in_ten_rounds_is_given_up(open_m, given_up):
-    assert whole._given_up(open_m, 0.25, 0.025) is given_up
+    assert estimate._given_up(open_m, 0.25, 0.025) is given_up
 
 
 def test_a_column_of_other_holds_ends_early_and_is_named(monkeypatch):

@@ -10,13 +10,13 @@ from tests.robot.found_lengths import found_lengths
 from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.self_calibration import identified, observability
+from wirebayes.robot.self_calibration.answer import joint_values_to
+from wirebayes.robot.self_calibration.estimate import _before_reading, with_levels
 from wirebayes.robot.self_calibration.predicted import predict_session
 from wirebayes.robot.self_calibration.residuals import misfit
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import summarised
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
-from wirebayes.robot.self_calibration.whole import _before_reading, with_levels
-from wirebayes.robot.self_calibration.whole_answer import joint_values_to
 
 
 def _line(count=300):

@@ -285,7 +285,7 @@ def test_calibrate_finds_the_lengths(fitted, session_csv, tmp_path):
 
 def test_a_calibration_that_does_not_converge_says_so_and_gives_no_joint_values(fitted, tmp_path, capsys, monkeypatch):
     """One hold read, its tensions five times too large: no lengths near their references make these."""
-    monkeypatch.setattr("wirebayes.robot.self_calibration.whole._ROUNDS", 8)  # sixty that lead nowhere take long
+    monkeypatch.setattr("wirebayes.robot.self_calibration.estimate._ROUNDS", 8)  # sixty that lead nowhere take long
     header, unread, read = (DOCS / "linear-7-session.csv").read_text().splitlines()[:3]
     cells = read.split(",")
     wrong = [

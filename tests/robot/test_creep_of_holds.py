@@ -12,7 +12,8 @@ from tests.robot.test_usable import _session
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.motion.creeping_hold import CreepingHold
-from wirebayes.robot.self_calibration import whole
+from wirebayes.robot.self_calibration import estimate
+from wirebayes.robot.self_calibration.answer import holds_of
 from wirebayes.robot.self_calibration.descent import Descent
 from wirebayes.robot.self_calibration.equations import Holds, Noise, State
 from wirebayes.robot.self_calibration.holds_creep import creep_of
@@ -21,7 +22,6 @@ from wirebayes.robot.self_calibration.posterior import gaussian_posterior
 from wirebayes.robot.self_calibration.predicted import predict_session
 from wirebayes.robot.self_calibration.session import LengthPrior
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
-from wirebayes.robot.self_calibration.whole_answer import holds_of
 
 # Steps of a third of a hold's thousandfold were off by 17, .9, .5, .2 and .75 standard deviations of a reading here.
 STRONG = [
@@ -161,7 +161,7 @@ def test_where_joint_values_are_exact_the_posterior_is_that_of_the_predicted_rea
     """
     session, readings, unknowns, holds = _read_exactly(kind, seed)
     first = State(np.zeros(unknowns.count), session.position_m, session.rotation, holds.tension_N)
-    found = whole.estimate(unknowns, holds, first)
+    found = estimate.estimate(unknowns, holds, first)
     assert found.converged
     white = found.state.white
     slopes, off = _by_differences(unknowns, session, readings, white)
@@ -169,4 +169,4 @@ def test_where_joint_values_are_exact_the_posterior_is_that_of_the_predicted_rea
     ratio = np.sqrt(np.diag(found.covariance) / np.diag(covariance))
     np.testing.assert_allclose(ratio, 1.0, atol=0.02)
     to_mode = covariance @ (slopes.T @ off - white)
-    np.testing.assert_allclose(to_mode / np.sqrt(np.diag(covariance)), 0.0, atol=2 * whole._STILL)
+    np.testing.assert_allclose(to_mode / np.sqrt(np.diag(covariance)), 0.0, atol=2 * estimate._STILL)

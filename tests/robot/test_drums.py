@@ -18,7 +18,7 @@ from wirebayes.robot.mechanics.description import Drums
 from wirebayes.robot.motion import claim, forward, inverse
 from wirebayes.robot.pose.answer import pose_report
 from wirebayes.robot.pose.request import PoseRequest
-from wirebayes.robot.self_calibration import session_file, whole_answer
+from wirebayes.robot.self_calibration import answer, session_file
 from wirebayes.strict.table import csv_table
 
 # one layer; five turns a layer; a spiral of one turn a layer; no drum known
@@ -138,7 +138,7 @@ def test_a_hold_that_one_sensor_did_not_read_keeps_the_other_readings(tmp_path):
     session, readings = session_file.read_session(path, robot, 0.02, 1e-3)
     assert session.read.tolist() == [True]
     np.testing.assert_array_equal(readings, [np.nan, *[100.0] * 7])
-    holds = whole_answer.holds_of(robot, session, readings)
+    holds = answer.holds_of(robot, session, readings)
     np.testing.assert_array_equal(holds.tension_N, [[np.nan, *[2.0] * 7]])
 
 

@@ -15,13 +15,13 @@ from wirebayes.robot.mechanics import draws
 from wirebayes.robot.mechanics.rotation import vector
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration import search, session_file
+from wirebayes.robot.self_calibration.answer import _Verdict, calibration_report
 from wirebayes.robot.self_calibration.equations import Holds
 from wirebayes.robot.self_calibration.predicted import predict_session
 from wirebayes.robot.self_calibration.search import Searched, StatedPoses
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.trust import joint_test
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
-from wirebayes.robot.self_calibration.whole_answer import _Verdict, calibration_report
 from wirebayes.strict.table import csv_table
 
 SPREAD = 1e-3  # from wire to wire: small, so that a session of eight stops is solved in a moment

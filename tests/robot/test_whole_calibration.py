@@ -12,7 +12,7 @@ from wirebayes.cli import main
 from wirebayes.io.run_folder import read_json
 from wirebayes.progress import silent
 from wirebayes.robot.mechanics import schema
-from wirebayes.robot.self_calibration import descent, search, summary, whole
+from wirebayes.robot.self_calibration import descent, estimate, search, summary
 from wirebayes.robot.self_calibration.equations import Holds, State
 
 
@@ -92,14 +92,14 @@ def test_a_search_whose_last_descent_was_cut_short_goes_on(fitted, session_csv, 
     """Whatever lay still may only have had too few steps; another descent finds that it had come down."""
     file, truth = session_csv
     _without_poses(file)
-    made, searches = whole._Search._round, []
+    made, searches = estimate._Search._round, []
 
     def watched(search):
         if search not in searches:
             searches.append(search)
         return made(search)
 
-    monkeypatch.setattr(whole._Search, "_round", watched)
+    monkeypatch.setattr(estimate._Search, "_round", watched)
     _calibrated(file, fitted, tmp_path / "whole", "--next-poses", "0")
     last = len(searches[0].rounds)
     searches.clear()
@@ -111,7 +111,7 @@ def test_a_search_whose_last_descent_was_cut_short_goes_on(fitted, session_csv, 
         search.came_down = False
         return replace(found, converged=False)
 
-    monkeypatch.setattr(whole._Search, "_round", cut_short)
+    monkeypatch.setattr(estimate._Search, "_round", cut_short)
     found = _calibrated(file, fitted, tmp_path / "cut", "--next-poses", "0")
     assert len(searches[0].rounds) > last
     assert _near(found["zero_tension_lengths_m"], truth)
@@ -142,7 +142,7 @@ def _without_poses(session):
 def test_a_noise_goes_at_most_twice_as_far_as_what_is_shown(shown):
     before = (np.log([0.3e-3, 1e-5]), np.log([1.0e-3, 1e-5]))
     last = (np.log([1.0e-3, 1e-5]), np.log([1e-3 * shown, 1e-5]))  # shown grows faster, or nearly as fast, than thought
-    joint, balance = np.exp(whole._ahead([before, last]))
+    joint, balance = np.exp(estimate._ahead([before, last]))
     assert (1 - 1e-9) * shown <= 1e3 * joint <= 2 * shown * (1 + 1e-9)
     assert balance == pytest.approx(1e-5)
 

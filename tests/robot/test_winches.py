@@ -23,7 +23,7 @@ from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
-from wirebayes.robot.self_calibration import predicted, whole_answer
+from wirebayes.robot.self_calibration import answer, predicted
 from wirebayes.robot.self_calibration import session as sessions
 from wirebayes.robot.self_calibration.unknowns import StatedErrors
 
@@ -298,7 +298,7 @@ def test_calibration_finds_each_lines_own_length(name, tmp_path):
     encoder = 0.1 * small * rng.normal(size=(stops, robot.joints))[:, robot.winch]
     read = joint + encoder + 0.1 * small * rng.normal(size=joint.shape)
     nowhere = replace(log, position_m=np.full_like(x, np.nan), rotation=np.full(level.shape, np.nan), joint_m=read)
-    found = whole_answer.calibration_report(robot, prior, StatedErrors(), nowhere, readings, 0, visits=0).content
+    found = answer.calibration_report(robot, prior, StatedErrors(), nowhere, readings, 0, visits=0).content
     assert found["usable"], found["warnings"]
     off = np.array(found["references_m"]["mean"]) - error[0]
     assert np.abs(off / found["references_m"]["sd"]).max() < 4

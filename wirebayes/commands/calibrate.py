@@ -30,7 +30,7 @@ from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, typical_spread
 from wirebayes.robot.mechanics.rotation import matrix
-from wirebayes.robot.self_calibration import session_file, whole_answer
+from wirebayes.robot.self_calibration import answer, session_file
 from wirebayes.robot.self_calibration.calibrated import Calibrated, from_dict, to_dict
 from wirebayes.robot.self_calibration.search import StatedPoses
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
@@ -71,9 +71,9 @@ def calibrate(
 ) -> Calibration:
     """Estimate a robot's lengths, geometry and poses from joint values, tensions and whatever else was read.
 
-    With exact geometry, tensions and requested poses this is the calibration of the lengths alone. An error of the
-    anchors, of the platform points, of the drums or of stated poses, poses that nobody knows or a session without
-    tensions make it the calibration of the whole robot.
+    With exact geometry and tensions that were read the lengths alone are unknown, and stated poses are requests. An
+    error of the anchors, of the platform points or of the drums makes these unknown too; with an error of the poses or
+    the joint values, poses that nobody knows or a session without tensions, stated poses are readings.
 
     Parameters
     ----------
@@ -280,7 +280,7 @@ def _estimated(
     """The content of ``calibration.json``, the posterior, and the robot where more than lengths is estimated."""
     errors, poses = given.stated(robot), given.poses(read[0])
     with computing(), np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
-        whole = whole_answer.calibration_report(robot, prior, errors, *read, seed, poses, visits, progress)
+        whole = answer.calibration_report(robot, prior, errors, *read, seed, poses, visits, progress)
     return whole.content, whole.known, None if given.exact else whole.robot
 
 

@@ -12,7 +12,7 @@ from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.rotation import matrix, vector
 from wirebayes.robot.motion.creep import CreepState
 from wirebayes.robot.self_calibration import predicted
-from wirebayes.robot.self_calibration.posterior import Whole
+from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
 
@@ -47,12 +47,12 @@ class Calibrated:
         return predicted.carried(self.robot, self.prior, self.session, unknowns)
 
 
-def calibrated(found: Whole, session: Session) -> Calibrated:
+def calibrated(found: RobotPosterior, session: Session) -> Calibrated:
     """What a calibration leaves known of references, wires and specimens, for a history on the calibrated robot.
 
     Parameters
     ----------
-    found : Whole
+    found : RobotPosterior
         Biases of its sensors, and its geometry, are averaged over.
     session : Session
     """

@@ -10,7 +10,7 @@ import numpy as np
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.rotation import matrix
-from wirebayes.robot.self_calibration.posterior import Whole
+from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.sentences import short
 
 _DETERMINED = 0.5  # of the standard deviation before
@@ -70,12 +70,12 @@ class Identified:
     weakest_sd_m: float
 
 
-def identified(found: Whole) -> Identified:
+def identified(found: RobotPosterior) -> Identified:
     """Compare the posterior of geometry and references with their prior.
 
     Parameters
     ----------
-    found : Whole
+    found : RobotPosterior
     """
     combinations = _of_exit_points(found) if found.unknowns.errors.exit_m > 0 else []
     sentences = []
@@ -104,7 +104,7 @@ def weakest_in_words(weakest: Floats, sd_m: float) -> str:
     return f"{', '.join(parts)}, known to {short(1e3 * sd_m, 2)} mm"
 
 
-def _weakest(found: Whole) -> tuple[Floats, float]:
+def _weakest(found: RobotPosterior) -> tuple[Floats, float]:
     """The unit combination ``(w,)`` of the reference lengths that is known least, its largest part positive; its sd."""
     at = found.unknowns.references
     values, vectors = np.linalg.eigh(found.covariance[at, at])
@@ -113,7 +113,7 @@ def _weakest(found: Whole) -> tuple[Floats, float]:
     return direction * np.sign(largest), found.unknowns.prior.reference_sd_m * float(np.sqrt(max(values[-1], 0.0)))
 
 
-def _of_references(found: Whole) -> list[str]:
+def _of_references(found: RobotPosterior) -> list[str]:
     """A sentence on each reference length that the readings do not determine."""
     sd = np.sqrt(np.diag(found.covariance)[found.unknowns.references])
     before = 1e3 * found.unknowns.prior.reference_sd_m
@@ -124,7 +124,7 @@ def _of_references(found: Whole) -> list[str]:
     return out
 
 
-def _sizes(found: Whole) -> Floats:
+def _sizes(found: RobotPosterior) -> Floats:
     """Variances of independent combinations of geometry and references, of their prior's."""
     unknowns = found.unknowns
     geometry = np.arange(unknowns.slices["wires"].start)
@@ -135,7 +135,7 @@ def _sizes(found: Whole) -> Floats:
     return np.linalg.eigvalsh(found.covariance[np.ix_(geometry, geometry)])
 
 
-def _of_exit_points(found: Whole) -> list[Combination]:
+def _of_exit_points(found: RobotPosterior) -> list[Combination]:
     """How well each motion of all exit points together is known."""
     robot, at = found.unknowns.robot, found.unknowns.slices["exit"]
     inside = found.covariance[at, at]

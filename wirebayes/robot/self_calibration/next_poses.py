@@ -16,7 +16,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import hanging, inverse
 from wirebayes.robot.self_calibration.equations import Equations, Holds, State, moved
 from wirebayes.robot.self_calibration.linearisation import linearised
-from wirebayes.robot.self_calibration.posterior import Whole
+from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.session import Session
 from wirebayes.robot.self_calibration.strain import Grown
 
@@ -38,12 +38,12 @@ class NextPoses:
     pose_sd_m: Floats
 
 
-def next_poses(found: Whole, holds: Holds, count: int, rng: np.random.Generator) -> NextPoses:
+def next_poses(found: RobotPosterior, holds: Holds, count: int, rng: np.random.Generator) -> NextPoses:
     """Choose poses one after another, each with those before it taken as visited.
 
     Parameters
     ----------
-    found : Whole
+    found : RobotPosterior
         What is known now.
     holds : Holds
         The session: what is read at a pose is what was read in most of its holds.
@@ -68,7 +68,7 @@ def next_poses(found: Whole, holds: Holds, count: int, rng: np.random.Generator)
     return NextPoses(poses.x[picked], sd)
 
 
-def _commanded(found: Whole, robot: Robot, told: Holds, poses: "_Candidates") -> Holds:
+def _commanded(found: RobotPosterior, robot: Robot, told: Holds, poses: "_Candidates") -> Holds:
     """Holds with the joint values that lead to candidates."""
     unknowns = found.unknowns
     parts = unknowns.parts(found.state.white)
@@ -142,13 +142,13 @@ def _tilt_as_read(holds: Holds, poses: _Candidates) -> Floats | None:
     return np.where(np.isfinite(holds.tilt).any(), poses.R[:, :2, 2], np.nan)
 
 
-def _at(found: Whole, holds: Holds, poses: _Candidates) -> Equations:
+def _at(found: RobotPosterior, holds: Holds, poses: _Candidates) -> Equations:
     state = State(found.state.white, poses.x, np.array(poses.R), poses.tau)
     no_creep = _no_creep(found, len(poses.x))
     return linearised(found.unknowns, holds, found.noise, state, no_creep, state)
 
 
-def _no_creep(found: Whole, count: int) -> Grown:
+def _no_creep(found: RobotPosterior, count: int) -> Grown:
     legs, wires = found.unknowns.robot.legs, len(found.unknowns.moments[0])
     return Grown(np.zeros((count, legs)), np.zeros((count, legs, wires)), np.zeros((count, count, legs)))
 

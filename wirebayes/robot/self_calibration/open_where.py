@@ -7,7 +7,7 @@ from wirebayes.numeric.means import root_mean_square
 from wirebayes.numeric.typing import Floats
 from wirebayes.result_warnings import Notice
 from wirebayes.robot.mechanics import rotation
-from wirebayes.robot.self_calibration.posterior import Whole
+from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.residuals import USUAL, leverage
 from wirebayes.robot.self_calibration.session import Session
 from wirebayes.sentences import listed, number, short
@@ -23,12 +23,12 @@ _FAR = 10.0
 _CHANCE = 1e-4  # that some hold of a sound session stands out as much
 
 
-def most_open(found: Whole, session: Session) -> str:
+def most_open(found: RobotPosterior, session: Session) -> str:
     """Which hold, or which wires, have most of what is open; empty where it is everywhere.
 
     Parameters
     ----------
-    found : Whole
+    found : RobotPosterior
         Of a search that found no robot with these joint values.
     session : Session
     """
@@ -55,12 +55,12 @@ def _open_wires(share: Floats) -> list[str]:
     return []
 
 
-def odd_hold(found: Whole, session: Session) -> list[Notice]:
+def odd_hold(found: RobotPosterior, session: Session) -> list[Notice]:
     """A notice that one hold's lengths contradict the others, estimated with it, by far more than these do.
 
     Parameters
     ----------
-    found : Whole
+    found : RobotPosterior
         Of a search that converged.
     session : Session
     """
@@ -82,12 +82,12 @@ def odd_hold(found: Whole, session: Session) -> list[Notice]:
     return [Notice("data", text)]
 
 
-def contradicted_requests(found: Whole, requested: Session | None) -> list[Notice]:
+def contradicted_requests(found: RobotPosterior, requested: Session | None) -> list[Notice]:
     """A notice for each hold whose requested pose is not where the joint values lead, for any plausible lengths.
 
     Parameters
     ----------
-    found : Whole
+    found : RobotPosterior
     requested : Session, optional
         With the poses that the robot was sent to.
     """
@@ -119,7 +119,7 @@ def _odd_in_words(hold: float, share: float, leg: int, joint_m: float) -> str:
     )
 
 
-def _chances(found: Whole, share: Floats) -> Floats:
+def _chances(found: RobotPosterior, share: Floats) -> Floats:
     """(p,) Probability that a hold of a sound session has so large a share."""
     left = 1.0 - leverage(found, found.equations.rows["loop"])
     free = np.maximum(left, 0.0).sum(1)
@@ -129,7 +129,7 @@ def _chances(found: Whole, share: Floats) -> Floats:
     return np.where((free > 0) & (others > 0), p, 1.0)
 
 
-def _shares(found: Whole) -> Floats:
+def _shares(found: RobotPosterior) -> Floats:
     """(p, w) of the sum of squares of all loops, a line each."""
     e = found.equations
     squares = (e.residual[:, e.rows["loop"]] / found.unknowns.robot.lines) ** 2

@@ -13,7 +13,7 @@ from wirebayes.robot.self_calibration.unknowns import Unknowns
 
 
 @dataclass(frozen=True)
-class Whole:
+class RobotPosterior:
     """Posterior of a robot and its session.
 
     Attributes
@@ -62,7 +62,7 @@ class Whole:
         return float(-0.5 * self.cost - noise)
 
 
-def gaussian_posterior(unknowns: Unknowns, down: Descent, noise: Noise, creep: Grown, last_m: Floats) -> Whole:
+def gaussian_posterior(unknowns: Unknowns, down: Descent, noise: Noise, creep: Grown, last_m: Floats) -> RobotPosterior:
     """The Gaussian about where a descent ended.
 
     Parameters
@@ -82,7 +82,7 @@ def gaussian_posterior(unknowns: Unknowns, down: Descent, noise: Noise, creep: G
     if not finite:  # a search that ended nowhere leaves what was known before
         covariance, by_robot, hold = np.eye(len(covariance)), np.zeros_like(by_robot), np.zeros_like(hold)
     good = down.converged and finite and bool(np.isfinite(down.cost))
-    return Whole(
+    return RobotPosterior(
         unknowns=unknowns,
         state=down.state,
         covariance=covariance,
@@ -98,12 +98,12 @@ def gaussian_posterior(unknowns: Unknowns, down: Descent, noise: Noise, creep: G
     )
 
 
-def at_joint_error(found: Whole, factor: float) -> Whole:
+def at_joint_error(found: RobotPosterior, factor: float) -> RobotPosterior:
     """The posterior about the same mode with the error of the loops larger by a factor.
 
     Parameters
     ----------
-    found : Whole
+    found : RobotPosterior
     factor : float
     """
     e, white = found.equations, found.state.white

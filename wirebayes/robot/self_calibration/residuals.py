@@ -7,7 +7,7 @@ from wirebayes.numeric.means import root_mean_square
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.self_calibration.equations import EXACT, FRICTIONLESS, Holds
-from wirebayes.robot.self_calibration.posterior import Whole
+from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.trust import joint_test
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 
@@ -25,7 +25,7 @@ _CONTRADICTED = 1e2  # mean squared residual: readings ten standard errors off
 _EXPLAINED = 3.0  # times the stated error of a joint value: loops that are no further open say nothing of the robot
 
 
-def trust(found: Whole) -> float:
+def trust(found: RobotPosterior) -> float:
     """Probability of residuals and estimates this far from model and priors: `trust.joint_test`.
 
     A hold's own unknowns have no prior, so each of them costs a degree of freedom. Geometry and references are tested
@@ -54,7 +54,7 @@ def lengths_tell(unknowns: Unknowns, read: Bools) -> bool:
     return unknowns.errors.joint_m == 0 and bool(read.any())
 
 
-def _joint_probability(found: Whole) -> float:
+def _joint_probability(found: RobotPosterior) -> float:
     """`trust.joint_test` of what was read and stated."""
     e, unknowns = found.equations, found.unknowns
     holds, _, own = e.by_hold.shape
@@ -67,26 +67,26 @@ def _joint_probability(found: Whole) -> float:
     return float(p[0])
 
 
-def _taken_up(found: Whole) -> float:
+def _taken_up(found: RobotPosterior) -> float:
     """Degrees of freedom that the unknowns take up of the tensions that nobody read."""
     of_tensions = leverage(found, found.equations.rows["tension"])
     return float(of_tensions[_unread(found)].sum())
 
 
-def _beyond_usual(found: Whole) -> float:
+def _beyond_usual(found: RobotPosterior) -> float:
     """Squared residuals, summed, of tensions that nobody read about what is usual."""
     of_tensions = found.equations.residual[:, found.equations.rows["tension"]]
     usual = of_tensions[_unread(found)]
     return float((usual**2).sum())
 
 
-def _unread(found: Whole) -> Bools:
+def _unread(found: RobotPosterior) -> Bools:
     """(p, w) Which tensions nobody read."""
     rows = found.equations.rows["tension"]
     return ~found.equations.known[:, rows]
 
 
-def misfit(found: Whole) -> float:
+def misfit(found: RobotPosterior) -> float:
     """Mean squared residual of what was read or stated with an error, the balance aside."""
     e, errors = found.equations, found.unknowns.errors
     exact = {"balance"}
@@ -103,34 +103,34 @@ def misfit(found: Whole) -> float:
     return float(np.mean(residuals**2)) if residuals.size else 0.0
 
 
-def contradicted(found: Whole) -> bool:
+def contradicted(found: RobotPosterior) -> bool:
     """Whether what was read contradicts stated errors beyond doubt: of readings that may err more, nothing is known."""
     return found.unknowns.errors.joint_m is not None and misfit(found) > _CONTRADICTED
 
 
-def length_rms_m(found: Whole) -> float:
+def length_rms_m(found: RobotPosterior) -> float:
     """Root mean square of what is left of the loops, along one line each, m."""
     e = found.equations
     left = e.residual[:, e.rows["loop"]] * found.noise.joint_m / found.unknowns.robot.lines
     return root_mean_square(left)
 
 
-def lost(found: Whole) -> bool:
+def lost(found: RobotPosterior) -> bool:
     """Whether nothing near the robot, however it errs, has these joint values."""
     return not length_rms_m(found) <= lost_m(found)
 
 
-def lost_m(found: Whole) -> float:
+def lost_m(found: RobotPosterior) -> float:
     """How far loops are open, m, from where on they are those of another robot."""
     return most_open_m(found, _LOST)
 
 
-def most_open_m(found: Whole, share: float) -> float:
+def most_open_m(found: RobotPosterior, share: float) -> float:
     """How far loops may stay open along one line: a share of the span, or what stated errors of joint values explain.
 
     Parameters
     ----------
-    found : Whole
+    found : RobotPosterior
     share : float
     """
     robot, stated = found.unknowns.robot, found.unknowns.errors.joint_m
@@ -150,14 +150,14 @@ def joint_error(unknowns: Unknowns, holds: Holds) -> float:
     return usual_joint(robot, holds)[0] if stated is None else max(stated, EXACT * robot.span_m)
 
 
-def noise_shown(found: Whole, usual_m: float, worth: float) -> tuple[Floats, float]:
+def noise_shown(found: RobotPosterior, usual_m: float, worth: float) -> tuple[Floats, float]:
     """Logarithms of the noises of loops and balance that the residuals show, and the degrees of freedom of the first.
 
     Restricted maximum likelihood; the usual error of the loops, `usual_m`, is `worth` some degrees of freedom.
 
     Parameters
     ----------
-    found : Whole
+    found : RobotPosterior
     usual_m, worth : float
         What `usual_joint` returned.
     """
@@ -171,7 +171,7 @@ def noise_shown(found: Whole, usual_m: float, worth: float) -> tuple[Floats, flo
     return np.log([joint, balance]), degrees
 
 
-def _shown(found: Whole, rows: str, sd: float, usual: float, worth: float) -> tuple[float, float]:
+def _shown(found: RobotPosterior, rows: str, sd: float, usual: float, worth: float) -> tuple[float, float]:
     """The noise of some equations by restricted maximum likelihood, and its degrees of freedom."""
     at = found.equations.rows[rows]
     residual = found.equations.residual[:, at]
@@ -181,7 +181,7 @@ def _shown(found: Whole, rows: str, sd: float, usual: float, worth: float) -> tu
     return float(np.sqrt((squares + worth * usual**2) / free)), free
 
 
-def leverage(found: Whole, rows: slice) -> Floats:
+def leverage(found: RobotPosterior, rows: slice) -> Floats:
     """(p, r) share of each residual's variance that the unknowns take up."""
     by_hold = found.equations.by_hold[:, rows]
     by_robot = found.equations.by_robot[:, rows]
@@ -192,7 +192,7 @@ def leverage(found: Whole, rows: slice) -> Floats:
     return own + np.einsum("pri,ij,prj->pr", total, found.covariance, total)
 
 
-def _usual_noise(found: Whole) -> float:
+def _usual_noise(found: RobotPosterior) -> float:
     """Probability of an error of the loops as large as found, where what is usual is all that was known of it."""
     e = found.equations
     read = e.known[:, e.rows["tension"]].any()

@@ -8,13 +8,13 @@ from scipy.special import chdtr, fdtrc
 
 from wirebayes.progress import Progress
 from wirebayes.robot.self_calibration.equations import Holds
-from wirebayes.robot.self_calibration.posterior import Whole
+from wirebayes.robot.self_calibration.estimate import estimate, progress_of
+from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.residuals import lost, misfit, trust, usual_joint
 from wirebayes.robot.self_calibration.seeds import best, near_requests
 from wirebayes.robot.self_calibration.sensors import Suspects, suspects
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.unknowns import Unknowns
-from wirebayes.robot.self_calibration.whole import estimate, progress_of
 
 _RATHER = 3.0  # times smaller errors of loops or balance, before stated poses are taken for requests
 _WELL, _CHANCE = 0.1, 1e-4  # of the standard deviation before; of estimates that near to their prior's mean
@@ -37,7 +37,7 @@ class Searched:
 
     Attributes
     ----------
-    found : Whole
+    found : RobotPosterior
     holds : Holds
         Without the stated poses where they were taken for requests.
     p : float
@@ -53,7 +53,7 @@ class Searched:
         no answer.
     """
 
-    found: Whole
+    found: RobotPosterior
     holds: Holds
     p: float
     at_fault: Suspects | None
@@ -100,8 +100,8 @@ def searched(
 
 
 def _rather_requests(
-    found: Whole, holds: Holds, too_good: bool, doubted: bool, progress: Progress
-) -> tuple[Whole, Holds, bool]:
+    found: RobotPosterior, holds: Holds, too_good: bool, doubted: bool, progress: Progress
+) -> tuple[RobotPosterior, Holds, bool]:
     """What is found without the poses, where they are commands or contradict the joint values: they were requests.
 
     An answer is not given up for a search that found none.
@@ -123,12 +123,12 @@ def _without_poses(holds: Holds) -> Holds:
     return replace(holds, session=holds.session.without_poses())
 
 
-def _steadier(found: Whole, other: Whole) -> bool:
+def _steadier(found: RobotPosterior, other: RobotPosterior) -> bool:
     """Whether tensions balance without the stated poses, and not with them."""
     return found.noise.balance > max(_UNSEEN, _RATHER * other.noise.balance)
 
 
-def _closer(found: Whole, other: Whole, holds: Holds) -> bool:
+def _closer(found: RobotPosterior, other: RobotPosterior, holds: Holds) -> bool:
     """Whether loops close so much better without the stated poses that chance is no reason.
 
     Poses that are unknown close every loop of a robot that has no wires to spare: such loops say nothing.
@@ -141,7 +141,7 @@ def _closer(found: Whole, other: Whole, holds: Holds) -> bool:
     return bool(fdtrc(with_poses, without, times**2) < SIGNIFICANT)
 
 
-def _too_good(found: Whole) -> bool:
+def _too_good(found: RobotPosterior) -> bool:
     """Whether estimates that the readings determine well lie nearer to the robot's file than its stated errors allow.
 
     Then the joint values were computed from the poses and the file: they are commands, and say nothing of where the

@@ -16,12 +16,12 @@ from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.equations import Holds, State, moved
-from wirebayes.robot.self_calibration.posterior import Whole
+from wirebayes.robot.self_calibration.estimate import estimate, progress_of, with_levels
+from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.residuals import lost, trust
 from wirebayes.robot.self_calibration.strain import stretch
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.unknowns import Unknowns
-from wirebayes.robot.self_calibration.whole import estimate, progress_of, with_levels
 
 _TRIALS, _STEPS = 24, 25  # places a search begins from, and its steps: mirror images and far corners are among them
 _WEAK = 1e-2  # pull towards the workspace and the home orientation, beside lengths
@@ -197,7 +197,7 @@ def best(
     progress: Progress = silent,
     called: str = "start",
     about: Holds | None = None,
-) -> Whole:
+) -> RobotPosterior:
     """The posterior from the likeliest of several starts: about the file's geometry, and about others near it.
 
     Parameters
@@ -213,7 +213,7 @@ def best(
     """
     unknowns = with_levels(unknowns, holds)
 
-    def from_start(white: Floats, number: int, near: Holds = holds) -> Whole:
+    def from_start(white: Floats, number: int, near: Holds = holds) -> RobotPosterior:
         watched = progress_of(progress, f"{called} {number}")
         return estimate(unknowns, holds, seed(unknowns, near, white, rng), watched)
 

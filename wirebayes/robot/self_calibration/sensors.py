@@ -16,11 +16,11 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.progress import ShareDone, shares_of
 from wirebayes.result_warnings import Notice
 from wirebayes.robot.self_calibration.equations import Holds
-from wirebayes.robot.self_calibration.posterior import Whole
+from wirebayes.robot.self_calibration.estimate import estimate
+from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.residuals import misfit, trust
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, chance
 from wirebayes.robot.self_calibration.unknowns import Unknowns
-from wirebayes.robot.self_calibration.whole import estimate
 from wirebayes.sentences import short
 
 LEAST_HOLDS = 2  # read: at a single one an error of a sensor and one of a length look the same
@@ -90,12 +90,12 @@ def weighed(bias_N: Floats, covariance: Floats, prior_sd_N: float) -> Suspects:
     return Suspects(score / own, own**-0.5, by_chance, alone, share)
 
 
-def suspects(found: Whole, holds: Holds, progress: ShareDone = lambda share: None) -> Suspects | None:
+def suspects(found: RobotPosterior, holds: Holds, progress: ShareDone = lambda share: None) -> Suspects | None:
     """Estimate an error of every sensor beside all else; None where they have one already, or nothing converged.
 
     Parameters
     ----------
-    found : Whole
+    found : RobotPosterior
     holds : Holds
     progress : function of a share between 0 and 1
     """
@@ -128,7 +128,7 @@ def suspects(found: Whole, holds: Holds, progress: ShareDone = lambda share: Non
     return None
 
 
-def _explain_little(found: Whole, other: Whole) -> bool:
+def _explain_little(found: RobotPosterior, other: RobotPosterior) -> bool:
     """Whether errors of all sensors together leave more of what contradicts stated errors than one may leave.
 
     Where the error of the joint values is estimated, it has taken up what contradicts.
@@ -138,7 +138,7 @@ def _explain_little(found: Whole, other: Whole) -> bool:
     return misfit(other) > (1 - MOST) * misfit(found)
 
 
-def _with_biases(found: Whole, sd_N: float) -> Unknowns:
+def _with_biases(found: RobotPosterior, sd_N: float) -> Unknowns:
     """The unknowns with an error of every tension sensor."""
     unknowns = found.unknowns
     # the error of the loops stays: it explains nothing that a sensor would, and the balance is exact

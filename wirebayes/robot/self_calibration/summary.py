@@ -13,7 +13,7 @@ from scipy.special import ndtri, stdtrit
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics.winches import of_each_leg
-from wirebayes.robot.self_calibration.posterior import Whole, at_joint_error
+from wirebayes.robot.self_calibration.posterior import RobotPosterior, at_joint_error
 
 _FACTOR = 1.05  # of the error of the joint values: a step for slopes of logarithms, which are smooth
 _MANY = 1e6  # degrees of freedom: more make no difference
@@ -55,12 +55,12 @@ class Summary:
     strain: Floats
 
 
-def summarised(found: Whole) -> Summary:
+def summarised(found: RobotPosterior) -> Summary:
     """Means, standard deviations and half widths of 90 % intervals.
 
     Parameters
     ----------
-    found : Whole
+    found : RobotPosterior
     """
     sds = _standard_deviations(found)
     halves = {name: np.full(np.shape(sd), ndtri(0.95)) for name, sd in sds.items()}
@@ -73,7 +73,7 @@ def summarised(found: Whole) -> Summary:
     return Summary(**moments, strain=found.creep.strain[-1])
 
 
-def _means(found: Whole) -> dict[str, Floats]:
+def _means(found: RobotPosterior) -> dict[str, Floats]:
     state, parts = found.state, found.unknowns.parts(found.state.white)
     return {
         "exit_m": parts.exit_m,
@@ -96,7 +96,7 @@ def _half(sd: Floats, wider: Floats, degrees: float) -> Floats:
     return np.asarray(stdtrit(own, 0.95))
 
 
-def _slope_of_lengths(found: Whole) -> Floats:
+def _slope_of_lengths(found: RobotPosterior) -> Floats:
     """The last zero-tension lengths by all unknowns: references, drums, and creep with the tensions that it follows."""
     unknowns, creep = found.unknowns, found.creep
     strain = creep.strain[-1]
@@ -111,7 +111,7 @@ def _slope_of_lengths(found: Whole) -> Floats:
     return slope
 
 
-def _standard_deviations(found: Whole) -> dict[str, Floats]:
+def _standard_deviations(found: RobotPosterior) -> dict[str, Floats]:
     unknowns, errors = found.unknowns, found.unknowns.errors
     robot, prior = unknowns.robot, unknowns.prior
     w, d = robot.legs, robot.degrees

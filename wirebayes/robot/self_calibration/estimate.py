@@ -1,4 +1,4 @@
-"""Calibration of the whole robot: the posterior of its unknowns and of every hold's pose, about their mode.
+"""Calibration: the posterior of a robot's unknowns and of every hold's pose, about their mode.
 
 Levenberg-Marquardt over robot and holds together, the holds eliminated one by one. A wide error of the loops at first,
 then ever smaller ones, lead from rough geometry to the mode.
@@ -17,7 +17,7 @@ from wirebayes.robot.self_calibration.descent import descend
 from wirebayes.robot.self_calibration.equations import FRICTIONLESS, Equations, Holds, Noise, State
 from wirebayes.robot.self_calibration.holds_creep import ROUGHLY, creep_of
 from wirebayes.robot.self_calibration.linearisation import linearised
-from wirebayes.robot.self_calibration.posterior import Whole, gaussian_posterior
+from wirebayes.robot.self_calibration.posterior import RobotPosterior, gaussian_posterior
 from wirebayes.robot.self_calibration.residuals import (
     contradicted,
     joint_error,
@@ -83,7 +83,9 @@ def progress_of(progress: Progress, name: str) -> ShareDone:
     return lambda share: progress(name, share, 1.0)
 
 
-def estimate(unknowns: Unknowns, holds: Holds, state: State, progress: ShareDone = lambda share: None) -> Whole:
+def estimate(
+    unknowns: Unknowns, holds: Holds, state: State, progress: ShareDone = lambda share: None
+) -> RobotPosterior:
     """The posterior next to a start; not converged where nothing near the robot has such joint values.
 
     Parameters
@@ -145,7 +147,7 @@ class _Search:
         read = np.isfinite(holds.tension_N).any()
         self.unit_N = holds.session.tension_sd_N if read else noise.pull_N
 
-    def at_rest(self, progress: ShareDone) -> Whole:
+    def at_rest(self, progress: ShareDone) -> RobotPosterior:
         """The posterior where nothing moves on; not converged where the search is given up.
 
         Slopes by every tension are right about the mode alone, so they come in once nothing moves without them.
@@ -158,7 +160,7 @@ class _Search:
         finer = self._until_still(_FINER_ROUNDS, finely)
         return finer if finer.converged else found
 
-    def _until_still(self, most: int, progress: ShareDone) -> Whole:
+    def _until_still(self, most: int, progress: ShareDone) -> RobotPosterior:
         """The posterior where nothing moves on with one kind of slopes; not converged after so many rounds."""
         for taken in range(most):
             progress(taken / most)
@@ -176,13 +178,13 @@ class _Search:
             self._go_on(found, sd, moved_on)
         return replace(found, converged=False)
 
-    def _contradicted(self, found: Whole) -> bool:
+    def _contradicted(self, found: RobotPosterior) -> bool:
         """Whether rounds come no nearer to readings that contradict what is stated: of no use is where they end."""
         self.costs.append(found.cost)
         before, since = self.costs[:-_STALLED], self.costs[-_STALLED:]
         return bool(before) and contradicted(found) and min(since) > _NEARER * min(before)
 
-    def _round(self) -> Whole:
+    def _round(self) -> RobotPosterior:
         """The posterior with creep about the last state, and the noise that its residuals show."""
         since = self.passed[-1]
         self.creep = creep_of(self.unknowns, self.holds, since, self.creep, self.roughly, self.each)
@@ -194,13 +196,13 @@ class _Search:
         self.rounds.append((thought, shown))
         return replace(found, degrees=degrees)
 
-    def _settled(self, found: Whole) -> bool:
+    def _settled(self, found: RobotPosterior) -> bool:
         """Whether noise and sum of squares are what they were, and the last descent was not cut short."""
         thought, shown = self.rounds[-1]
         level = np.abs(shown - thought).max() < _SETTLED
         return bool(self.came_down and level and abs(self.cost - found.cost) < _LEVEL_FIT)
 
-    def _go_on(self, found: Whole, sd: Floats, moved_on: float) -> None:
+    def _go_on(self, found: RobotPosterior, sd: Floats, moved_on: float) -> None:
         """What the next round begins with."""
         taken = len(self.rounds)
         self.cost = found.cost

@@ -1,4 +1,4 @@
-"""Everything that the calibration of a whole robot reports, as ``calibration.json`` holds it."""
+"""Everything that a calibration reports, as ``calibration.json`` holds it."""
 
 from dataclasses import dataclass, replace
 
@@ -27,25 +27,25 @@ from wirebayes.robot.motion import home, inverse, plausible
 from wirebayes.robot.self_calibration import sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
 from wirebayes.robot.self_calibration.equations import Holds, moved
+from wirebayes.robot.self_calibration.estimate import estimate, progress_of
 from wirebayes.robot.self_calibration.identified import Identified, identified, weakest_in_words
 from wirebayes.robot.self_calibration.mistaken import column_notices, tension_notices
 from wirebayes.robot.self_calibration.next_poses import NextPoses, next_poses
 from wirebayes.robot.self_calibration.open_where import contradicted_requests, most_open, odd_hold
-from wirebayes.robot.self_calibration.posterior import Whole
+from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.residuals import contradicted, length_rms_m, lost, misfit, trust
 from wirebayes.robot.self_calibration.search import Searched, StatedPoses, searched
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import Summary, summarised
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, chance, interval_about, unlearnt, unlikely
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
-from wirebayes.robot.self_calibration.whole import estimate, progress_of
 from wirebayes.sentences import number, short
 
 _UNEVEN = 0.05  # of the weight: balance that fails by more shows that something else held the platform
 
 
 @dataclass(frozen=True)
-class WholeAnswer:
+class CalibrationAnswer:
     """The content of ``calibration.json``, and the robot with the history that it can go on from."""
 
     content: CalibrateJson
@@ -83,7 +83,7 @@ def calibration_report(
     poses: StatedPoses = StatedPoses.MEASURED,
     visits: int = 5,
     progress: Progress = silent,
-) -> WholeAnswer:
+) -> CalibrationAnswer:
     """Calibrate a whole robot and say how far the answer can be trusted.
 
     Parameters
@@ -142,7 +142,7 @@ def calibration_report(
             ]
         ),
     }
-    return WholeAnswer(content, moved(robot, found.unknowns.parts(found.state.white)), calibrated(found, session))
+    return CalibrationAnswer(content, moved(robot, found.unknowns.parts(found.state.white)), calibrated(found, session))
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,7 @@ def _poses(s: Summary, session: Session) -> EstimatedPoses:
     return {"hold": np.asarray(session.numbers, float).tolist(), **interval_about(mean, sd, half)}
 
 
-def _lengths(found: Whole, s: Summary, p_joint: float) -> EstimatedLengths:
+def _lengths(found: RobotPosterior, s: Summary, p_joint: float) -> EstimatedLengths:
     reference = s.reference_m
     known: EstimatedLengths = {
         "converged": found.converged,
@@ -207,7 +207,7 @@ def _lengths(found: Whole, s: Summary, p_joint: float) -> EstimatedLengths:
     return known
 
 
-def _by_hooke_alone(found: Whole, holds: Holds, prior: LengthPrior, progress: Progress) -> EstimatedLengths:
+def _by_hooke_alone(found: RobotPosterior, holds: Holds, prior: LengthPrior, progress: Progress) -> EstimatedLengths:
     """What would be found if the wires did not creep."""
     without = replace(found.unknowns, prior=replace(prior, creeps=False))
     plain = estimate(without, holds, found.state, progress_of(progress, "without creep"))
@@ -226,7 +226,7 @@ def _observability(seen: Identified, errors: StatedErrors) -> ObservabilityJson:
     }
 
 
-def _joint_errors(found: Whole) -> JointErrors:
+def _joint_errors(found: RobotPosterior) -> JointErrors:
     """How far the lengths are from the joint values; None where these are exact."""
     if found.unknowns.errors.joint_m == 0:
         return {"length_rms_mm": None, "joint_sd_mm": None}
@@ -245,7 +245,7 @@ def _identified(seen: Identified) -> IdentifiedJson:
     }
 
 
-def _now(robot: Robot, found: Whole, s: Summary, usable: bool) -> CalibratedPoses:
+def _now(robot: Robot, found: RobotPosterior, s: Summary, usable: bool) -> CalibratedPoses:
     """Where the platform is after the last hold; joint values of the home pose where they can be used."""
     if not found.converged:
         return {"pose_now": None, "joint_values_for_home_m": None}
@@ -262,12 +262,12 @@ def _now(robot: Robot, found: Whole, s: Summary, usable: bool) -> CalibratedPose
     return now
 
 
-def joint_values_to(found: Whole, position_m: Floats, turn: Floats) -> Floats:
+def joint_values_to(found: RobotPosterior, position_m: Floats, turn: Floats) -> Floats:
     """Joint values that bring the platform to a pose after the session, by the robot that was found.
 
     Parameters
     ----------
-    found : Whole
+    found : RobotPosterior
     position_m, turn : (3,), (3, 3) arrays
         The pose.
 
@@ -347,7 +347,7 @@ def _columns(search: Searched) -> list[Notice]:
     return column_notices(search.found.unknowns.robot, state.position_m, state.rotation, search.holds.tension_N)
 
 
-def _not_converged(found: Whole, session: Session) -> str:
+def _not_converged(found: RobotPosterior, session: Session) -> str:
     """What to do about a search that found no mode."""
     if not lost(found):
         if contradicted(found):
