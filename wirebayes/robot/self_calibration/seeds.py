@@ -14,7 +14,7 @@ from wirebayes.progress import Progress, silent
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Poses, Robot
-from wirebayes.robot.motion import inverse
+from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.self_calibration.equations import Holds, State, moved
 from wirebayes.robot.self_calibration.estimate import estimate, progress_of, with_levels
 from wirebayes.robot.self_calibration.posterior import RobotPosterior
@@ -30,6 +30,7 @@ _SMALL = 1e-3  # N of imbalance for which a tension may be 1 N smaller: decides 
 # pose: the hold's place is looked for like one of which nothing is known.
 _ASTRAY, _OFF = 0.05, 5.0
 _OTHERS = 2  # further starts, where the first does not explain the readings
+_HANGING = 2  # and where nobody read tensions: poses in balance, for wires that are slack close no loop
 
 
 def seed(unknowns: Unknowns, holds: Holds, white: Floats, rng: Generator) -> State:
@@ -230,7 +231,42 @@ def best(
             other = estimate(unknowns, holds, other.state)
         if other.converged > found.converged or other.evidence > found.evidence:
             found = other
+    if np.isfinite(holds.tension_N).any():
+        return found
+    for k in range(_HANGING):
+        if found.converged and trust(found) >= SIGNIFICANT:
+            break
+        white = np.array(found.state.white) if k and found.converged else np.zeros(unknowns.count)
+        hanging = hanging_state(unknowns, holds, seed(unknowns, about or holds, white, rng))
+        other = estimate(unknowns, holds, hanging, progress_of(progress, f"{called} {_OTHERS + 2 + k}"))
+        if other.converged and not (found.converged and trust(found) >= trust(other)):
+            found = other
     return found
+
+
+def hanging_state(unknowns: Unknowns, holds: Holds, state: State) -> State:
+    """A state whose poses are the equilibria under the joint values, wires that are too long for them slack.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    holds : Holds
+    state : State
+        Where the equilibria are looked for; its poses stay where there is none.
+    """
+    parts = unknowns.parts(state.white)
+    robot = moved(unknowns.robot, parts)
+    wires, _ = unknowns.prior.wires(robot, parts.wires[None])
+    bare, offset = inverse.lengths(robot, holds.session.joint_m)
+    zero = bare + parts.reference_m
+    of_holds = wires.part(np.zeros(len(zero), int))
+    found = forward.solve_equilibrium(robot, of_holds, zero, offset, state.position_m, state.rotation)
+    position = chosen_rows(found.found, found.position_m, state.position_m)
+    turn = chosen_rows(found.found, found.rotation, state.rotation)
+    way = statics.stretched(robot, statics.geometry(robot, position.T, batch_last(turn)), offset.T).T
+    gap_N = of_holds.theta["k1"].T * (way / zero - 1.0)  # of slack wires negative, as latent tensions are
+    latent = np.where(found.tension_N > 0.0, found.tension_N, gap_N)
+    return State(state.white, position, turn, chosen_rows(found.found, latent, state.pull_N))
 
 
 def near_requests(unknowns: Unknowns, holds: Holds) -> Holds:
