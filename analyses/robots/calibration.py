@@ -126,9 +126,9 @@ def study(name, line, count, rng):
     results = {label: [found_lengths(robot, one, session, read) for read in readings] for label, one in models.items()}
     for label, each in results.items():
         length = [summarised(found).length_m for found in each]
-        mean, sd, half = (np.array(part) for part in zip(*length, strict=True))
-        inside = (np.abs(mean - real.length_m) <= half * sd).mean(1)
-        error = 1e3 * (mean - real.length_m)
+        middle, sd, half = (np.array(part) for part in zip(*length, strict=True))
+        inside = (np.abs(middle - real.length_m) <= half * sd).mean(1)
+        error = 1e3 * (middle - real.length_m)
         print(
             f"  {label:12s} converged {np.mean([found.converged for found in each]):.3f}  "
             f"covers {inside.mean():.3f} +- "

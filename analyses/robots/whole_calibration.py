@@ -56,7 +56,7 @@ SENSED = ("point-4", "point-5", "body-7", "body-8")
 BIAS = 10  # standard errors of a tension reading
 ENCODERS = (1e-5, 1e-4)  # error of a length over the span: .05 to .5 mm of 5 m
 OFF = (1e-4, 1e-2)  # of the span, .5 to 50 mm of 5 m: how far anchors are off that are held exact
-FEW = 8  # stops where poses are requests and all else is exact: the history is solved for every unknown, seconds a step
+FEW = 8  # stops where poses are requests and all else is exact
 SEEN = 0.99  # power from which wrong anchors are to be seen
 
 
@@ -251,7 +251,7 @@ def exact(size: int, seed: int) -> Iterator[dict[str, Any]]:
         with np.errstate(all="ignore"):
             poses = StatedPoses.REQUESTED if asked.stops == FEW else StatedPoses.MEASURED
             found = answer.calibration_report(robot, one.told.prior, errors, log, readings, seed, poses, 0).content
-            power = _power(one, errors, _unplaced(log) if asked.stops == FEW else log) if asked.anchor else 0.0
+            power = _power(one, errors, log.without_poses() if asked.stops == FEW else log) if asked.anchor else 0.0
         yield {
             "kind": asked.kind,
             "mode": asked.mode,
@@ -263,12 +263,6 @@ def exact(size: int, seed: int) -> Iterator[dict[str, Any]]:
             "p": float(found["with_creep_model"]["p_joint"]),
             "seconds": time.process_time() - begun,
         }
-
-
-def _unplaced(log: session.Session) -> session.Session:
-    """The session with poses that are requests: they are no readings."""
-    nowhere, unturned = np.full_like(log.position_m, np.nan), np.full_like(log.rotation, np.nan)
-    return replace(log, position_m=nowhere, rotation=unturned)
 
 
 def _power(one: Case, errors: StatedErrors, log: session.Session) -> float:
