@@ -8,7 +8,7 @@ import pytest
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration import seeds, whole_answer
+from wirebayes.robot.self_calibration import answer, seeds
 from wirebayes.robot.self_calibration.equations import Holds
 from wirebayes.robot.self_calibration.predicted import predict_session
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
@@ -48,7 +48,7 @@ def test_lengths_are_found_though_nobody_knows_which_wires_were_slack(seed):
     tension = real.readings.reshape(-1, told.legs)
     assert (tension == 0.0).any(1).sum() >= 3  # stops with a slack wire
     errors = StatedErrors(1e-2)
-    found = whole_answer.calibration_report(told, prior, errors, session, np.empty(0), visits=0).content
+    found = answer.calibration_report(told, prior, errors, session, np.empty(0), visits=0).content
     assert found["with_creep_model"]["converged"]
     kinds = {warning["kind"] for warning in found["warnings"]}
     assert not kinds & {"misfit", "not-converged"}

@@ -335,11 +335,11 @@ def _referred(problem: Problem, theta: Array) -> Problem:
 
 
 def _tensions(problem: Problem, theta: Array, sample: Sample) -> Array:
-    """Tensions of all readings of a sample, as set or without noise."""
+    """(k,) tensions of all readings of a sample, as set or without noise."""
     protocol = sample.protocol
     if protocol.control == "force":
         return np.broadcast_to(protocol.setting[:, None], protocol.mask.shape)[protocol.mask]
-    return simulate(protocol, problem.parameters(theta, sample), sample.model)[protocol.mask]
+    return simulate(protocol, problem.parameters(theta, sample), sample.model)[protocol.mask, 0]
 
 
 def _write_readings(path: Path, experiment: Experiment, sample: Sample) -> None:
