@@ -49,7 +49,11 @@ KINDS = {
     ),
     "dropout": Kind("The tension falls to nothing for some readings and comes back.", True),
     "gross-error": Kind("A single reading looks wrong, and was set aside where it would have decided.", True),
-    "data": Kind("Readings are not what a bench gives: their order, units, signs or noise.", True),
+    "data": Kind(
+        "Readings are not what a bench gives: their order, units, signs or noise; or what the file states contradicts "
+        "them.",
+        True,
+    ),
     "prior": Kind("The prior decides the answer, or contradicts the readings.", True),
     "few-holds": Kind("There are fewer than three holds: no effect can be established.", True),
     "hold-ends": Kind(

@@ -55,11 +55,11 @@ def test_a_file_in_no_known_words_says_how_it_was_read(tmp_path):
     path.write_bytes(("ŝovo (mm),horloĝo (s),tiro (N)\n" + body()).encode("iso8859-3"))
     with pytest.raises(wb.InputError, match="the file is not UTF-8 and was read as CP1252: if names look wrong, save"):
         read(path)
-    path.write_text("slide (mm),when (s),pulling (N)\n" + body())
-    named = r'--map "slide \(mm\)=displacement" --map "when \(s\)=time" --map "pulling \(N\)=tension"$'
+    path.write_text("gap (mm),when (s),pulling (N)\n" + body())
+    named = r'--map "gap \(mm\)=displacement" --map "when \(s\)=time" --map "pulling \(N\)=tension"$'
     with pytest.raises(wb.InputError, match=named):  # what each unit says; the user decides
         read(path)
-    path.write_text("slide (mm),width (mm),when (s),pulling (N)\n" + body())
+    path.write_text("gap (mm),width (mm),when (s),pulling (N)\n" + body())
     with pytest.raises(wb.InputError, match=r'"HEADER=displacement \[mm\]".*header has no unit\)$'):
         read(path)
 

@@ -325,7 +325,6 @@ def test_the_documented_session_is_one():
         (",30.0,", ",-30.0,", "line 2, column 8 (duration_s)"),
         (",30.0,", ",nan,", "line 2, column 8 (duration_s)"),
         (",30.0,", ",", "line 2"),
-        (",,,,,,,\n", ",1.0,,,,,,\n", "line 2"),
         ("\n1,", "\n\nx,", "line 3, column 1 (hold)"),  # an empty line counts
         ("\n3,", "\n1,", "line 4, column 1 (hold): found 1 once more, expected a row for each hold"),
     ],
