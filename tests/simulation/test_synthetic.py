@@ -10,7 +10,8 @@ from wirebayes.cli import main
 from wirebayes.effects import effect_named
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.run_folder import read_json
-from wirebayes.simulation.synthetic import Bench, Truth, draw, effect_option, write_tests
+from wirebayes.simulation.stated_truth import effect_option
+from wirebayes.simulation.synthetic import Bench, Truth, draw, write_tests
 
 TRUE = {"k1": 700.0, "B": 0.2, "U": 0.4, "k2": 0.02, "N": 1.0, "preload": 0.3, "sensor_sd": 0.005, "setting_sd": 0.01}
 

@@ -68,7 +68,7 @@ def simulate_command(
     from wirebayes.cli.answer import print_answer
     from wirebayes.commands.simulate_tests import simulate_tests
     from wirebayes.errors import InputError
-    from wirebayes.simulation.synthetic import finite_number
+    from wirebayes.simulation.stated_truth import finite_number
 
     chosen = {}
     for text in parameter or ():

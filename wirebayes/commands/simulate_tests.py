@@ -12,7 +12,8 @@ from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
 from wirebayes.io.experiment_file import SHORTEST
 from wirebayes.io.run_folder import check_run, open_run
-from wirebayes.simulation.synthetic import Bench, Truth, draw, effect_option, finite_number, write_tests
+from wirebayes.simulation.stated_truth import effect_option, finite_number
+from wirebayes.simulation.synthetic import Bench, Truth, draw, write_tests
 from wirebayes.strict.files import PathLike
 from wirebayes.strict.table import LARGEST
 from wirebayes.views.result import ResultFolder
