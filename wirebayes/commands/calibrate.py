@@ -280,8 +280,8 @@ def _estimated(
     """The content of ``calibration.json``, the posterior, and the robot where more than lengths is estimated."""
     errors, poses = given.stated(robot), given.poses(read[0])
     with computing(), np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
-        whole = answer.calibration_report(robot, prior, errors, *read, seed, poses, visits, progress)
-    return whole.content, whole.known, None if given.exact else whole.robot
+        found = answer.calibration_report(robot, prior, errors, *read, seed, poses, visits, progress)
+    return found.content, found.known, None if given.exact else found.robot
 
 
 def _write(folder: Path, robot: Robot, found: CalibrateJson, known: Calibrated, of: BelongsTo) -> None:

@@ -218,10 +218,11 @@ def best(
         watched = progress_of(progress, f"{called} {number}")
         return estimate(unknowns, holds, seed(unknowns, near, white, rng), watched)
 
-    found = from_start(np.zeros(unknowns.count), 1, about or holds)
+    begun = holds if about is None else about
+    found = from_start(np.zeros(unknowns.count), 1, begun)
     for k in range(_OTHERS):
-        if found.converged and trust(found) >= SIGNIFICANT:
-            break
+        if _explains(found):
+            return found
         white = np.array(found.state.white)  # holds that went astray are looked for again
         if k > 0:
             white = _near_file(unknowns, rng)
@@ -234,14 +235,23 @@ def best(
     if np.isfinite(holds.tension_N).any():
         return found
     for k in range(_HANGING):
-        if found.converged and trust(found) >= SIGNIFICANT:
-            break
-        white = np.array(found.state.white) if k and found.converged else np.zeros(unknowns.count)
-        hanging = hanging_state(unknowns, holds, seed(unknowns, about or holds, white, rng))
-        other = estimate(unknowns, holds, hanging, progress_of(progress, f"{called} {_OTHERS + 2 + k}"))
-        if other.converged and not (found.converged and trust(found) >= trust(other)):
+        if _explains(found):
+            return found
+        white = np.zeros(unknowns.count)
+        if k > 0 and found.converged:
+            white = np.array(found.state.white)
+        hanging = hanging_state(unknowns, holds, seed(unknowns, begun, white, rng))
+        watched = progress_of(progress, f"{called} {_OTHERS + 2 + k}")
+        other = estimate(unknowns, holds, hanging, watched)
+        as_good = found.converged and trust(found) >= trust(other)
+        if other.converged and not as_good:
             found = other
     return found
+
+
+def _explains(found: RobotPosterior) -> bool:
+    """Whether a search ended, and model and priors allow what was read."""
+    return found.converged and trust(found) >= SIGNIFICANT
 
 
 def hanging_state(unknowns: Unknowns, holds: Holds, state: State) -> State:
