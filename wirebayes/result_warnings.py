@@ -31,9 +31,9 @@ KINDS = {
         True,
     ),
     "not-converged": Kind("A sampler or a search did not converge: its numbers are not to be used.", True),
-    "misfit": Kind("Readings contradict the model that should explain them by more than their stated errors.", True),
+    "misfit": Kind("Readings deviate from the model that should explain them by more than their stated errors.", True),
     "failed": Kind("Something could not be computed at all, for the reason given.", True),
-    "unheld": Kind("No tensions hold the platform at a pose, or not those of every draw.", True),
+    "unheld": Kind("No tensions hold the platform at a pose, for some or all of the draws.", True),
     "uncarried": Kind("No wire carries any weight, and the robot's file names no table or rail that does.", True),
     "fall": Kind("The platform falls or loses its hold, or is close to it.", True),
     "slack": Kind("A wire goes slack, or keeps little of its tension.", True),
@@ -57,8 +57,8 @@ KINDS = {
     "prior": Kind("The prior decides the answer, or contradicts the readings.", True),
     "few-holds": Kind("There are fewer than three holds: no effect can be established.", True),
     "hold-ends": Kind(
-        "When holds ended is not known, or a rest is taken for a part of its hold, and it matters: a parameter would "
-        "be another by more than its standard deviation.",
+        "It is not known when holds ended, or a rest may have been counted as part of a hold, and this matters: a "
+        "parameter would change by more than its standard deviation.",
         False,
     ),
     "extrapolation": Kind(
@@ -66,14 +66,17 @@ KINDS = {
         "pose foresees.",
         False,
     ),
-    "left-out": Kind("Something that is known of wire or robot has no place in the answer.", False),
+    "left-out": Kind("Something that is known about the wire or the robot is not used in the answer.", False),
     "geometry": Kind(
-        "What is asked does not fit the robot, as more wire than a drum holds, or its file does not fit itself.", False
+        "The request does not fit the robot, such as more wire than a drum holds, or its file contradicts itself.",
+        False,
     ),
-    "sag": Kind("A wire's own weight matters, which the statics leaves out.", False),
-    "clock": Kind("It matters when the creep of a moving wire starts anew, which no test of holds shows.", False),
+    "sag": Kind("A wire's own weight matters, but the statics leaves it out.", False),
+    "clock": Kind(
+        "The answer depends on when the creep of a moving wire starts anew, which no test of holds can show.", False
+    ),
     "few-draws": Kind("Few posterior draws agree with the readings: the ends of the bands are rough.", False),
-    "budget": Kind("No test fits into the time there is.", False),
+    "budget": Kind("No test fits into the available time.", False),
 }
 """The kinds of warnings, gravest first."""
 

@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from wirebayes.commands.list_effects import EffectDescription
 
 Name = Annotated[str | None, typer.Argument(metavar="[NAME]", help="Describe this effect only.")]
-Kept = Annotated[Path | None, typer.Option("--output", metavar="DIR", help="Folder for the same as effects.txt.")]
+Kept = Annotated[
+    Path | None, typer.Option("--output", metavar="DIR", help="Folder for effects.txt, which holds the same text.")
+]
 
 
 def effects_command(name: Name = None, output: Kept = None, seed: Seed = 0, own_effects: OwnEffects = None) -> None:

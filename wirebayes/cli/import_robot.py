@@ -27,7 +27,10 @@ def import_robot_command(
     cable_set: Annotated[
         str | None, typer.Option("--cable-set", metavar="ID", help="Which of CASPR's cable sets.")
     ] = None,
-    pulleys: Annotated[bool, typer.Option("--pulleys/--no-pulleys", help="Whether radii of pulleys are meant.")] = True,
+    pulleys: Annotated[
+        bool,
+        typer.Option("--pulleys/--no-pulleys", help="Keep the pulleys' radii, or let the wires leave from points."),
+    ] = True,
     seed: Seed = 0,
     quiet: Quiet = False,
 ) -> None:

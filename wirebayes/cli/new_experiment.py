@@ -12,7 +12,9 @@ def init_command(
     directory: Annotated[
         Path | None, typer.Argument(metavar="DIR", help="Folder for the files; created if absent.")
     ] = None,
-    output: Annotated[Path | None, typer.Option("--output", metavar="DIR", help="The folder, as an option.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", metavar="DIR", help="The same folder, given as an option.")
+    ] = None,
     seed: Seed = 0,
     quiet: Quiet = False,
 ) -> None:

@@ -31,7 +31,7 @@ OutputOfNoFile = Annotated[
 Seed = Annotated[
     int,
     typer.Option(
-        "--seed", callback=_seed, help="Of all random numbers: the same seed gives the same bytes on one machine."
+        "--seed", callback=_seed, help="Seed of all random numbers; the same seed gives the same bytes on one machine."
     ),
 ]
 ExperimentName = Annotated[str | None, typer.Option("--experiment", metavar="NAME", help="This experiment only.")]

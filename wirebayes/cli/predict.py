@@ -10,7 +10,10 @@ from wirebayes.cli.options import AsJson, ExperimentName, Quiet, Seed
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A folder written by fit or discover.")]
 ProtocolFile = Annotated[
-    Path, typer.Argument(metavar="PROTOCOL.csv", help="hold,displacement_mm,time_s[,temperature_C][,tension_N]")
+    Path,
+    typer.Argument(
+        metavar="PROTOCOL.csv", help="With columns hold,displacement_mm,time_s[,temperature_C][,tension_N]."
+    ),
 ]
 ModelOption = Annotated[
     Literal["plain", "final"] | None,

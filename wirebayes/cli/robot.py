@@ -14,7 +14,7 @@ Wires = Annotated[
         "--wires",
         metavar="FOLDER",
         help="A folder with a posterior.nc, or several of one line with commas between; NAME=FOLDER for each of "
-        "several wires. None where the robot's file gives the parameters of all.",
+        "several wires. Not needed if the robot's file gives the parameters of all.",
     ),
 ]
 Draws = Annotated[int, typer.Option("--draws", min=1, help="Posterior draws used, evenly thinned.")]
@@ -103,9 +103,9 @@ def pose_command(
 ) -> None:
     """Predict how far the platform of a robot drifts on creeping wires, and its pose error, with uncertainty bands.
 
-    Of one pose, or over time: --joints takes measured values and finds the pose, --trajectory takes commanded poses and
-    finds the drift. Give the final fit of discover as --wires and its plain one as --other-fit to see what the effects
-    are worth.
+    Without a table it predicts a single pose. Over time, --joints takes measured joint values and finds the poses, and
+    --trajectory takes commanded poses and finds the drift. Give the final fit of discover as --wires and its plain one
+    as --other-fit to see what the effects are worth.
     """
     from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress

@@ -51,13 +51,15 @@ def simulate_command(
         typer.Option(
             "--parameter",
             metavar="NAME=VALUE",
-            help="For example k1=700; parameters not given are drawn from the prior.",
+            help="A true value, for example k1=700; others are drawn from the prior.",
         ),
     ] = None,
     effect: Annotated[
         list[str] | None,
         typer.Option(
-            "--effect", metavar="NAME.p=VALUE", help="For example strain_stiffening.c=12 or grip_slip@7.w=0.2."
+            "--effect",
+            metavar="NAME.p=VALUE",
+            help="An effect to add, for example strain_stiffening.c=12 or grip_slip@7.w=0.2.",
         ),
     ] = None,
     own_effects: OwnEffects = None,
