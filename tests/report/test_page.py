@@ -339,7 +339,7 @@ WORSE = DISCOVERY["held_out"] | {"final": {"rmse_N": 0.2, "elpd": 9.0, "elpd_dif
 def test_a_page_says_of_a_name_that_it_is_the_nearest_of_the_catalogue(changes, tmp_path):
     content = {"experiments": {"wire-a": DISCOVERY | changes}}
     page = read(write_page(folder_of(tmp_path / "out", "discover", discovery=content)))
-    assert ("an effect that the catalogue lacks gets it too" in page.words) == (not changes)
+    assert ("an effect that the catalogue lacks gets this name too" in page.words) == (not changes)
 
 
 @pytest.mark.parametrize(

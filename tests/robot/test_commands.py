@@ -92,7 +92,7 @@ def test_pose_answers_and_repeats_to_the_byte(fitted, tmp_path, capsys):
     assert "Between calibrations" in page
     assert pose["pose_error"][0]["times_s"] == [0.0, 60.0]  # each table has times of its own
     assert "is the last of the requested times that is (0 s, 1 min)" in page
-    assert "is the last of eight times a decade, from 1 s on" in page
+    assert "is the last such time on a grid of eight per decade, from 1 s on" in page
     assert (out[0] / "robot.svg").stat().st_size > 1000
     scene = read_json(out[0] / "scene.json")
     assert np.shape(scene["drifted"]) == (len(scene["times"]), len(scene["exits"]), 3)

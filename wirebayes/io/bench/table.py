@@ -270,7 +270,7 @@ def _check_gaps(sheet: Sheet, head: SheetRow, body: Sequence[SheetRow]) -> None:
     if short is not None and any(len(row.cells) == named for row in of_numbers):
         raise InputError(
             f"{sheet.path}, line {short.line}: found {len(short.cells)} numbers between spaces, expected {named} as in "
-            f"the header of line {head.line}, for which of them is missing cannot be seen; write NaN in its place"
+            f"the header of line {head.line}: the line does not show which is missing; write NaN in its place"
         )
 
 

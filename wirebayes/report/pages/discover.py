@@ -81,8 +81,8 @@ _MOST_SENTENCES = 3  # at the head of a page; more hide its first picture
 _SPEAKS = 0.05  # p of a pattern that says something
 _LEAST = 0.01  # probability of a candidate that is worth a row
 _NEAREST = (
-    "A name is that of the nearest effect in the catalogue: an effect that the catalogue lacks gets it too, where it "
-    "looks alike in this test."
+    "A name is that of the nearest effect in the catalogue: an effect that the catalogue lacks gets this name too, if "
+    "it looks the same in this test."
 )
 _TERMS = ("hold", "90 % interval", "p", "held out", "rms", "elpd", "in the 90 % band", "gap closed")
 

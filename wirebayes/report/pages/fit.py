@@ -190,7 +190,7 @@ def _continued(summary: SummaryJson, trusted: bool) -> str:
     """What the picture of the creep that goes on says; how far that is stands with the numbers above it."""
     if trusted:
         return summary["extrapolation"]["sentence"]
-    return "The model does not describe the readings, so its later creep may be other than this."
+    return "The model does not describe the readings, so the wire's later creep may differ from this."
 
 
 def _next(summary: SummaryJson) -> str:

@@ -149,7 +149,7 @@ def _commanded(pose: PoseJson) -> list[str]:
     angles = inverse.get("motor_angle_rad")
     if angles:
         turned = ", ".join("no drum" if angle is None else f"{angle:.5g}" for angle in angles["mean"])
-        points.append(f"Motor angles, rad, counted from nothing paid out: {turned}.")
+        points.append(f"Motor angles, rad, counted from no wire paid out: {turned}.")
     return points
 
 
@@ -308,7 +308,9 @@ def _between(pose: PoseJson) -> list[Block]:
         lines.append([controller, spread, loaded, _longest_time(entry)])
     header = ["controller", "specimen spread", "loaded before", "longest time between calibrations"]
     limits = _limits(entries[0])
-    grid = "The last column is the last of eight times a decade, from 1 s on: it is at most a quarter too short."
+    grid = (
+        "The last column is the last such time on a grid of eight per decade, from 1 s on: at most a quarter too short."
+    )
     return [Table(header, lines, f"The pose is exact when a calibration ends. {limits} {grid}")]
 
 
