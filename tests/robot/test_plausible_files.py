@@ -178,3 +178,28 @@ def test_the_warnings_stand_in_an_answer_and_where_there_is_none():
     for said in (held, nowhere):
         assert [one["text"][:17] for one in said if one["kind"] == "geometry"] == ["leg.beyond_exit_m"]
     assert [one["kind"] for one in nowhere][0] in ("unheld", "uncarried")
+
+
+@pytest.mark.parametrize("share", [0.999, 1.001])
+def test_a_linear_actuators_wire_shorter_than_its_way_is_suspected(share):
+    """At home, by every command; at another pose by `pose`, unless home says it already."""
+    robot = schema.read_robot_file("linear-6")
+    way_m = float(np.linalg.norm(robot.exit_m - robot.home_m - robot.platform_m, axis=1)[1])
+    lengths = np.where(np.arange(6) == 1, robot.lines[1] * way_m * share, robot.wire_m)
+    there = robot.home_m + [0.0, 0.0, 2.0 * robot.exit_m[:, 2].max()], np.eye(3)
+    short = replace(robot, wire_m=lengths)
+    said = _warned(short)
+    assert bool(said) == (share < 1)
+    assert all(text.startswith("leg.wire_length_m of wire 2:") and "at home" in text for text in said)
+    said_there = [notice.text for notice in plausible.pose_notices(short, *there)]
+    assert bool(said_there) == (share > 1)
+    assert all("at this pose" in text for text in said_there)
+    assert plausible.pose_notices(robot, robot.home_m, np.eye(3)) == []
+
+
+def test_a_pose_beyond_a_linear_actuators_wire_is_told():
+    robot = schema.read_robot_file("linear-6")
+    lower = robot.home_m - [0.0, 0.0, 3.0]
+    request = PoseRequest(lower, np.eye(3), np.array([0.0, 60.0]))
+    texts = [notice["text"] for notice in pose_report(robot, LINE, request).content["warnings"]]
+    assert any(text.startswith("leg.wire_length_m of wire 1") and "at this pose" in text for text in texts)

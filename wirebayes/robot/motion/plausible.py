@@ -12,7 +12,7 @@ import numpy as np
 from wirebayes.errors import shown
 from wirebayes.numeric.batches import batch_last
 from wirebayes.numeric.rows import chosen_rows
-from wirebayes.numeric.typing import Bools, Floats
+from wirebayes.numeric.typing import Bools, Floats, Indices
 from wirebayes.result_warnings import Notice
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
@@ -127,10 +127,38 @@ def robot_notices(robot: Robot) -> list[Notice]:
     robot : Robot
     """
     found = [
-        _exit_points(robot), _platform_points(robot), _centre_of_mass(robot), _home(robot), *_lengths_of_legs(robot)
+        _exit_points(robot), _platform_points(robot), _centre_of_mass(robot), _home(robot), *_lengths_of_legs(robot),
+        _short_wires(robot, robot.home_m, matrix(robot.home_rotation_rad), "home"),
     ]  # fmt: skip
     out = [Notice("geometry", f"{text}; is the unit of the robot's file metres?") for text in found if text]
     return out + _outside(robot) + _copies(robot)
+
+
+def pose_notices(robot: Robot, position_m: Floats, rotation: Floats) -> list[Notice]:
+    """A warning that linear actuators' wires are too short for a pose, unless the file's home pose already has it.
+
+    Parameters
+    ----------
+    robot : Robot
+    position_m, rotation : (3,), (3, 3) arrays
+    """
+    if _short_wires(robot, robot.home_m, matrix(robot.home_rotation_rad), "home"):
+        return []
+    text = _short_wires(robot, position_m, rotation, "this pose")
+    return [Notice("geometry", text)] if text else []
+
+
+def _short_wires(robot: Robot, position_m: Floats, rotation: Floats, where: str) -> str:
+    """The first linear actuator whose wire is shorter than its lines are at a pose, which no joint value changes."""
+    lines_m = robot.lines * statics.geometry_at(robot, position_m, rotation).distance_m[:, 0]
+    legs = np.flatnonzero(robot.is_linear & (lines_m > robot.wire_m))
+    if not legs.size:
+        return ""
+    first = legs[0]
+    return (
+        f"leg.wire_length_m of wire {first + 1}{_and_more(legs)}: {number(robot.wire_m[first])} m, less than the "
+        f"{number(lines_m[first])} m from exit point to platform at {where}"
+    )
 
 
 def _outside(robot: Robot) -> list[Notice]:
@@ -229,8 +257,11 @@ def _longer(key: str, length_m: Floats, most_m: float, said: str) -> list[str]:
     legs = np.flatnonzero(length_m > most_m)
     if not legs.size:
         return []
-    more = f" and {legs.size - 1} more" if legs.size > 1 else ""
-    return [f"leg.{key} of wire {legs[0] + 1}{more}: {number(length_m[legs[0]])} m, {said}"]
+    return [f"leg.{key} of wire {legs[0] + 1}{_and_more(legs)}: {number(length_m[legs[0]])} m, {said}"]
+
+
+def _and_more(legs: Indices) -> str:
+    return f" and {legs.size - 1} more" if legs.size > 1 else ""
 
 
 def _straight_at_home(robot: Robot) -> Floats:

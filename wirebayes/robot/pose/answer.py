@@ -287,6 +287,7 @@ def _untested(held: _Held) -> list[Notice]:
     robot, request, commands = held.robot, held.request, held.commands
     out = wire_doubts.wire_warnings(robot, held.line, held.tension_N, float(request.times_s[-1]), commands.zero_m)
     out += sag.sag_warnings(robot, request.position_m, request.rotation, held.tension_N[0])
+    out += plausible.pose_notices(robot, request.position_m, request.rotation)
     return out if robot.drums is None else out + _emptied(robot.drums, commands.joint_m[commands.feasible])
 
 
