@@ -30,12 +30,12 @@ def table_of_claims(kept: dict[str, Any]) -> str:
             "intervals-study",
         ),
         (
-            "so they do at any scale, from thread to mooring rope",
+            "they do so at any scale, from thread to mooring rope",
             f"{percent(min(every_scale))} to {percent(max(every_scale))}, by parameter, of {scales['tests']} tests",
             "intervals-study",
         ),
         (
-            "so they do whatever the protocol, as long as the wire stays taut",
+            "they do so whatever the protocol, as long as the wire stays taut",
             f"{percent(taut['all'])}, of {taut['tests']} tests; {percent(slack['all'])} where it is slack in a hold",
             "intervals-study",
         ),
@@ -50,7 +50,7 @@ def table_of_claims(kept: dict[str, Any]) -> str:
             "check-study",
         ),
         (
-            "``discover`` names an effect of its catalogue, of δ = 10, rightly",
+            "``discover`` names an effect of its catalogue, of δ = 10, correctly",
             f"{share_in_table('discover-hidden.inc', 'top-ranked effect in the true group, δ = 10')} files in which "
             "it sees something",
             "discover-study",
@@ -106,9 +106,9 @@ def answer_of_discover() -> str:
     both = share_in_table(hidden, "two effects: both accepted")
     wrong = share_in_table(hidden, _OF_NO_GROUP)
     return (
-        f"It suspects an effect in {alarms} files that have none. A single hidden effect of δ = 10 it sees in {seen} "
-        f"files; where it does, what it puts first is of the true kind in {first}. Of two effects at once it accepts "
-        f"both in {both}. Of the names that it accepts {wrong} are wrong.\n"
+        f"It suspects an effect in {alarms} files that have none. It sees a single hidden effect of δ = 10 in "
+        f"{seen} files; where it does, the effect that it ranks first is of the true kind in {first}. Of two effects "
+        f"at once it accepts both in {both}. Of the names that it accepts, {wrong} are wrong.\n"
     )
 
 

@@ -18,8 +18,8 @@ def false_alarms_at_any_scale(kept: dict[str, Any]) -> str:
     names = f"names accepted: {named}" if named else "no name was accepted"
     lines = [
         f"{run_of(kept)}, at a level of {alpha:.0f} %. Where the check failed,",
-        f"``discover`` said: {verdicts}; {names}. In {searched['same_p']} of {searched['tests']} tests that both",
-        "were asked, the two had the same p. If p is uniform, values as uneven have a probability of",
+        f"``discover`` said: {verdicts}; {names}. In {searched['same_p']} of {searched['tests']} tests that",
+        "were given to both, the two found the same p. If p is uniform, values as uneven have a probability of",
         f"{found['uniform_p']:.2f} (Kolmogorov-Smirnov).",
         "",
         *table_head(
@@ -159,7 +159,7 @@ def evidence_of_first_holds(kept: dict[str, Any]) -> str:
     found = kept["result"]
     models = list(next(iter(found.values()))["log_evidence"])
     said = [_spoken([model]).replace("+", " and ") for model in models]
-    lines = [f"{run_of(kept)}; log evidence is in nats, less that of the plain model:", ""]
+    lines = [f"{run_of(kept)}; log evidence is in nats, relative to the plain model:", ""]
     lines += table_head("first holds", "verdict", "accepted", "rms of later holds, N", *said)
     for holds, of_these in found.items():
         named = of_these["named"]
@@ -194,7 +194,7 @@ def evidence_of_refits(kept: dict[str, Any]) -> str:
     far = found["farther_than"]
     which = f": {'; '.join(each)}" if each else ""
     said = (
-        f"Of {found['files']} files with one hidden effect, the log Bayes factor of its refit less that of the "
+        f"Of {found['files']} files with one hidden effect, the log Bayes factor of its refit minus that of the "
         f"integrals is {found['median']:+.2f} in the median, and {ends} in nine of ten. It is off by more than three "
         f"in {far['3']}, by more than one in {far['1']}{which}."
     )

@@ -84,7 +84,7 @@ def steps_and_weights(kept: dict[str, Any]) -> str:
         f"{run_of(kept)} fits {found['pairs']} such lines under "
         f"steps, under weights, and both together: the 90 % interval of the creep after a hold at the typical "
         f"tension holds the truth in {inside}; its median width, in the logarithm, is {widths}, together "
-        f"{together['median_width']:.3f}, and both together are the sharpest in {found['together_sharpest']}.\n"
+        f"{together['median_width']:.3f}, and both together give the narrowest in {found['together_sharpest']}.\n"
     )
 
 

@@ -33,12 +33,12 @@ def anchors_from_lengths_alone(kept: dict[str, Any]) -> str:
         for share in (blind["found"], blind["silently_wrong"])
     )
     lines = [
-        "Lengths alone, of 24 unknown poses, on four or five anchors that are 2 % of the span off, with unread",
-        "tensions that the robot's file bounds at 0.3 of what the lines may bear:",
+        "Lengths alone, at 24 unknown poses, with four or five anchors that are off by 2 % of the span, and with",
+        "unread tensions that the robot's file bounds at 0.3 of what the lines may bear:",
         f"{run_of(kept)} finds {right} of {blind['robots']}",
         "calibrations usable with every coordinate within four standard errors (95 % interval),",
-        f"{wrong} usable and wrong; the others are refused. Distances between anchors are then",
-        f"{100 * blind['distance_error_over_before']:.0f} % as wrong as before, at the median.",
+        f"{wrong} usable and wrong; the others are refused. Errors of distances between anchors are then",
+        f"{100 * blind['distance_error_over_before']:.0f} % of those before, at the median.",
     ]
     return "\n".join(lines) + "\n"
 

@@ -21,13 +21,13 @@ SYMBOLS = {
     "setting_sd": "standard deviation of the error of what one hold is set to: a displacement, or a weight",
 }
 TERMS = {
-    "hold": "one position of the moving end, kept while the tension is read.",
+    "hold": "one displacement, or one weight, kept while readings are taken.",
     "90 % interval": "the quantity lies in it with a probability of 90 %, given the readings, the prior and the model.",
-    "prior": "what was assumed of a thin line before any reading of this test.",
-    "contraction": "share of the prior's variance that the readings took away, of the logarithm if it is positive. At "
-    "0 % nothing was learned, from 90 % on the readings determine the parameter.",
+    "prior": "what was assumed about a parameter before any reading of this test.",
+    "contraction": "share of the prior's variance that the readings took away; for a positive parameter, the variance "
+    "of its logarithm. At 0 % nothing was learned, from 90 % on the readings determine the parameter.",
     "held out": "readings kept from the model while it was fitted, then predicted: an honest test of it.",
-    "rms": "root mean square of measured minus predicted tension: a typical error of one reading.",
+    "rms": "root mean square of measured minus predicted readings: a typical error of one reading.",
     "elpd": "expected log predictive density: how well left-out holds are predicted, larger is better. A difference "
     "of less than 4, or of less than twice its standard error, decides nothing.",
     "in the 90 % band": "share of the held-out readings that lie in their 90 % band; 90 % is right, far less means "

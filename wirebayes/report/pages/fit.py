@@ -303,8 +303,8 @@ def _parameters(draws: dict[str, Array], shrunk: dict[str, float], sample: Sampl
         lines.append([name, unit, *interval, share, _means(name, effects, control)])
     caption = (
         "The interval contains the parameter with a probability of 90 %, if the model is right. "
-        "Contraction is the share of the prior's variance that the readings took away, of the logarithm where a "
-        f"quantity is positive; from {100 * MOST:.0f} % on the readings determine a parameter."
+        "Contraction is the share of the prior's variance that the readings took away (of its logarithm, for a "
+        f"positive parameter); from {100 * MOST:.0f} % on the readings determine a parameter."
     )
     header = ["parameter", "unit", "median", "90 % interval", "contraction", "what it is"]
     return Table(header, lines, caption)
