@@ -1,7 +1,7 @@
 """Logs that fit no robot near the file's: the search is given up and says so; and how far a search has come."""
 
 import csv
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,9 +14,10 @@ from wirebayes.commands.wires import robot_of
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.self_calibration import descent, estimate, open_where, residuals, session_file
 from wirebayes.robot.self_calibration.answer import calibration_report
+from wirebayes.robot.self_calibration.equations import Holds, Noise, State
 from wirebayes.robot.self_calibration.search import StatedPoses
 from wirebayes.robot.self_calibration.session import LengthPrior
-from wirebayes.robot.self_calibration.unknowns import StatedErrors
+from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
 from wirebayes.strict.columns import columns_table
 
 FIELD = Path(__file__).parent / "field" / "calibrate-wrong-anchors"
@@ -111,6 +112,105 @@ def test_a_search_is_given_up_where_loops_are_further_open_than_the_robot_or_its
 )
 def test_a_search_whose_loops_come_no_tenth_nearer_in_ten_rounds_is_given_up(open_m, given_up):
     assert estimate._given_up(open_m, 0.25, 0.025) is given_up
+
+
+@pytest.mark.parametrize(
+    ("moved", "circling"),
+    [
+        ([0.1] * 10, False),
+        ([0.1] * 11, True),
+        ([0.1] * 10 + [0.0901], True),
+        ([0.1] * 10 + [0.0899], False),
+        ([0.0501] * 11, True),
+        ([0.0499] + [0.06] * 10, False),
+    ],
+)
+def test_unknowns_that_come_no_tenth_nearer_to_rest_in_ten_rounds_go_to_and_fro(moved, circling):
+    assert estimate._no_nearer(moved, estimate._STILL) is circling
+
+
+@pytest.mark.parametrize(("converges", "finer"), [(True, 4), (False, 49)])
+def test_a_search_that_goes_to_and_fro_goes_on_with_slopes_by_every_tension(monkeypatch, converges, finer):
+    """It then has as many rounds as are left."""
+    each = []
+
+    def a_round(search):
+        each.append(search.each)
+        search.rounds.append(None)
+        at_rest = converges and each.count(True) == finer
+        search.passed = [search.state]
+        search.state = replace(search.state, white=search.state.white + (0.0 if at_rest else 1.0))
+        return _at(search, cost=1.0)
+
+    monkeypatch.setattr(estimate._Search, "_round", a_round)
+    monkeypatch.setattr(estimate._Search, "_settled", lambda search, found: True)
+    monkeypatch.setattr(estimate._Search, "_leads_nowhere", lambda search, found: False)
+    monkeypatch.setattr(estimate._Search, "_go_on", lambda search, *arguments: None)
+    found = _search().at_rest(lambda share: None)
+    assert found.converged is converges
+    assert (each.count(False), each.count(True)) == (11, finer)
+
+
+@pytest.mark.parametrize(("cost", "ends"), [(1e300, False), (np.inf, True)])
+def test_a_search_ends_where_its_equations_are_no_numbers(monkeypatch, cost, ends):
+    """All searches for exact joint values of another robot came there; from no numbers there is no step."""
+    monkeypatch.setattr(estimate, "length_rms_m", lambda found: 0.0)
+    monkeypatch.setattr(estimate, "most_open_m", lambda found, share: 1.0)
+    monkeypatch.setattr(estimate, "lost_m", lambda found: 1.0)
+    monkeypatch.setattr(estimate, "contradicted", lambda found: False)
+    search = _search()
+    assert search._leads_nowhere(_at(search, cost)) is ends
+
+
+@pytest.mark.parametrize(
+    ("follow", "each", "unusual", "given_up"),
+    [(True, False, True, True), (False, False, True, False), (True, True, True, False), (True, False, False, False)],
+)
+def test_where_other_starts_follow_loops_that_stay_unusually_open_end_a_search(
+    monkeypatch, follow, each, unusual, given_up
+):
+    """But for slopes by every tension, which come in where a search is at rest or goes to and fro."""
+    monkeypatch.setattr(estimate, "length_rms_m", lambda found: 0.001)
+    monkeypatch.setattr(estimate, "most_open_m", lambda found, share: 1.0)
+    monkeypatch.setattr(estimate, "lost_m", lambda found: 0.01)
+    monkeypatch.setattr(estimate, "contradicted", lambda found: False)
+    monkeypatch.setattr(estimate, "unusually_open", lambda found: unusual)
+    search = _search(follow)
+    search.each = each
+    ends = [search._leads_nowhere(_at(search, 1.0)) for _ in range(11)]
+    assert ends == [False] * 10 + [given_up]
+
+
+@pytest.mark.parametrize(("p", "unusual"), [(0.00251, False), (0.00249, True)])
+def test_loops_are_unusually_open_where_their_share_of_the_level_is_lost(monkeypatch, p, unusual):
+    """A hundredth, shared by four tests."""
+    monkeypatch.setattr(residuals, "_usual_noise", lambda found: p)
+    assert residuals.unusually_open(None) is unusual
+
+
+@dataclass(frozen=True)
+class _Found:
+    """As much of a posterior as a search asks for."""
+
+    covariance: np.ndarray
+    cost: float
+    converged: bool = True
+
+
+def _at(search, cost):
+    return _Found(np.eye(len(search.state.white)), cost)
+
+
+def _search(others_follow=False):
+    """A search of a printer's log that has not begun."""
+    robot = robot_of(FIELD / "hp4-rough.toml")
+    table = columns_table(_turned_log(3), Path("log"), session_file.may_be_empty)
+    session, _ = session_file.parse_session(table, robot, 5.0, 1e-3)
+    holds = Holds(session, np.full(session.joint_m.shape, np.nan))
+    unknowns = Unknowns(robot, LengthPrior(LINE, 0.05, 0.05), ROUGH)
+    state = State(np.zeros(unknowns.count), session.position_m, session.rotation, np.ones(session.joint_m.shape))
+    noise = Noise(1.0, 1.0, 1.0, 1.0, 1.0)
+    return estimate._Search(unknowns, holds, noise, state, None, others_follow)
 
 
 def test_a_column_of_other_holds_ends_early_and_is_named(monkeypatch):

@@ -1,6 +1,7 @@
 """Calibration from lengths alone where some stops left wires slack: equilibria are where the search then begins."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -70,3 +71,34 @@ def test_the_start_is_an_equilibrium_with_negative_tensions_in_slack_wires():
     slack = state.pull_N < 0.0
     assert (way_m[slack] < zero_m[slack]).all() and (way_m[~slack] > zero_m[~slack]).all()
     np.testing.assert_allclose(state.pull_N, LINE["k1"] * (way_m / zero_m - 1.0), rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("gap_N", "converged", "unusual", "begun", "goes_on"),
+    [(-0.1, False, True, 1, 1), (-0.1, False, False, 1, 0), (-0.1, True, True, 2, 0), (0.1, True, True, 0, 0)],
+)
+def test_poses_in_balance_are_begun_from_where_wires_are_slack_and_no_place_twice(
+    monkeypatch, gap_N, converged, unusual, begun, goes_on
+):
+    """Without a search that ended, the second would begin where the first did; a search that was given up goes on."""
+    told, _, prior, session, _ = stops(8, 3)
+    holds = Holds(session, np.full(session.joint_m.shape, np.nan))
+    started = []
+
+    def found_nothing(unknowns, holds, state, progress=None, others_follow=False):
+        started.append((state, others_follow))
+        return SimpleNamespace(converged=converged, evidence=0.0, state=state, unknowns=unknowns)
+
+    def hanging(unknowns, holds, state):
+        pull_N = np.ones_like(state.pull_N)
+        pull_N[1, 2] = gap_N
+        return replace(state, pull_N=pull_N)
+
+    monkeypatch.setattr(seeds, "estimate", found_nothing)
+    monkeypatch.setattr(seeds, "hanging_state", hanging)
+    monkeypatch.setattr(seeds, "trust", lambda found: 0.001)
+    monkeypatch.setattr(seeds, "lost", lambda found: False)
+    monkeypatch.setattr(seeds, "unusually_open", lambda found: unusual)
+    seeds.best(Unknowns(told, prior, StatedErrors(1e-2)), holds, np.random.default_rng(0))
+    assert [state.pull_N.min() < 0.0 for state, _ in started[3 : 3 + begun]] == [True] * begun
+    assert [others for _, others in started] == [True] * (3 + begun) + [False] * goes_on

@@ -27,6 +27,7 @@ from wirebayes.robot.self_calibration.residuals import (
     lost_m,
     most_open_m,
     noise_shown,
+    unusually_open,
     usual_joint,
 )
 from wirebayes.robot.self_calibration.strain import Grown
@@ -39,7 +40,8 @@ _FINER_ROUNDS = 12  # with slopes by every tension: of 22 searches of drawn robo
 # astray later and come back.
 _PATIENT, _HOPELESS = 5, 0.1
 # Rounds in which loops that are another robot's (`residuals.lost`) come no tenth nearer, after which a search is given
-# up: of sessions that fit, none had any such round among 194 searches.
+# up: of sessions that fit, none had any such round among 194 searches. Unknowns that come no tenth nearer to rest for
+# as long go to and fro: slopes by every tension then lead on.
 _STALLED, _NEARER = 10, 0.9
 _SOFT = 0.03  # of what is known best of tensions
 _WHOLE_ROUNDS = 3  # before creep goes half the way only
@@ -84,7 +86,11 @@ def progress_of(progress: Progress, name: str) -> ShareDone:
 
 
 def estimate(
-    unknowns: Unknowns, holds: Holds, state: State, progress: ShareDone = lambda share: None
+    unknowns: Unknowns,
+    holds: Holds,
+    state: State,
+    progress: ShareDone = lambda share: None,
+    others_follow: bool = False,
 ) -> RobotPosterior:
     """The posterior next to a start; not converged where nothing near the robot has such joint values.
 
@@ -95,13 +101,15 @@ def estimate(
     state : State
         A rough guess.
     progress : function of a share between 0 and 1
+    others_follow : bool
+        Whether other starts follow, so that a search is given up too where loops stay open unusually far.
     """
     noise = _before_reading(unknowns, holds)
     creep = creep_of(unknowns, holds, state, roughly=ROUGHLY)
     state = _from_rough(unknowns, holds, noise, state, creep)
     if unknowns.errors.joint_m is None:
         noise = _noise_at(unknowns, holds, noise, state, creep)
-    search = _Search(unknowns, holds, noise, state, creep)
+    search = _Search(unknowns, holds, noise, state, creep, others_follow)
     found = search.at_rest(progress)
     progress(1.0)
     return replace(found, converged=found.converged and not lost(found))
@@ -131,16 +139,24 @@ class _Search:
         Whether the last descent ended at a least sum of squares, not for want of steps.
     each : bool
         Whether creep follows the tension of every hold by itself (`strain.grown`).
+    moved : list of float
+        How far unknowns moved on in each round, in standard deviations.
+    circling : bool
+        Whether they come no nearer to rest.
     """
 
-    def __init__(self, unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown) -> None:
+    def __init__(
+        self, unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown, others_follow: bool
+    ) -> None:
         self.unknowns, self.holds = unknowns, holds
+        self.others_follow = others_follow
         self.noise, self.state, self.creep = noise, state, creep
         self.passed = [state]
         self.roughly, self.cost = ROUGHLY, np.inf
-        self.came_down = self.each = False
+        self.came_down = self.each = self.circling = False
         self.rounds: list[tuple[Floats, Floats]] = []
         self.opened_m: list[float] = []
+        self.moved: list[float] = []
         self.costs: list[float] = []
         self.last_m, _ = inverse.lengths(unknowns.robot, holds.session.joint_m[-1])
         self.usual = usual_joint(unknowns.robot, holds)
@@ -150,18 +166,20 @@ class _Search:
     def at_rest(self, progress: ShareDone) -> RobotPosterior:
         """The posterior where nothing moves on; not converged where the search is given up.
 
-        Slopes by every tension are right about the mode alone, so they come in once nothing moves without them.
+        Slopes by every tension are right about the mode alone, so they come in once nothing moves without them, or
+        once what moves comes no nearer to rest.
         """
         roughly, finely = shares_of(progress, 2)
         found = self._until_still(_ROUNDS, roughly)
-        if not (found.converged and self.unknowns.prior.creeps):
+        if not (self.unknowns.prior.creeps and (found.converged or self.circling)):
             return found
+        most = _FINER_ROUNDS if found.converged else _ROUNDS - len(self.rounds)
         self.each = True
-        finer = self._until_still(_FINER_ROUNDS, finely)
+        finer = self._until_still(most, finely)
         return finer if finer.converged else found
 
     def _until_still(self, most: int, progress: ShareDone) -> RobotPosterior:
-        """The posterior where nothing moves on with one kind of slopes; not converged after so many rounds."""
+        """The posterior where nothing moves on with one kind of slopes; not converged where the search ends before."""
         for taken in range(most):
             progress(taken / most)
             found = self._round()
@@ -171,18 +189,29 @@ class _Search:
             moved_on = float(moved.max(initial=0.0))
             if self._settled(found) and moved_on < _STILL:
                 return found
-            self.opened_m.append(length_rms_m(found))
-            hopeless_m = most_open_m(found, _HOPELESS)
-            if _given_up(self.opened_m, hopeless_m, lost_m(found)) or self._contradicted(found):
+            if self._leads_nowhere(found):
+                break
+            self.moved.append(moved_on)
+            self.circling = not self.each and _no_nearer(self.moved, _STILL)
+            if self.circling:
                 break
             self._go_on(found, sd, moved_on)
         return replace(found, converged=False)
 
+    def _leads_nowhere(self, found: RobotPosterior) -> bool:
+        """Whether further rounds would not come to what was read."""
+        if not np.isfinite(found.cost):  # no step leads on from there
+            return True
+        self.opened_m.append(length_rms_m(found))
+        hopeless_m = most_open_m(found, _HOPELESS)
+        elsewhere = self.others_follow and not self.each and unusually_open(found)
+        far_m = 0.0 if elsewhere else lost_m(found)
+        return _given_up(self.opened_m, hopeless_m, far_m) or self._contradicted(found)
+
     def _contradicted(self, found: RobotPosterior) -> bool:
         """Whether rounds come no nearer to readings that contradict what is stated: of no use is where they end."""
         self.costs.append(found.cost)
-        before, since = self.costs[:-_STALLED], self.costs[-_STALLED:]
-        return bool(before) and contradicted(found) and min(since) > _NEARER * min(before)
+        return contradicted(found) and _no_nearer(self.costs)
 
     def _round(self) -> RobotPosterior:
         """The posterior with creep about the last state, and the noise that its residuals show."""
@@ -215,22 +244,32 @@ class _Search:
         self.noise = _next_noise(self.noise, self.rounds)
 
 
-def _given_up(opened_m: list[float], hopeless_m: float, lost_m: float) -> bool:
+def _no_nearer(sizes: list[float], small: float = 0.0) -> bool:
+    """Whether what stayed larger than is small has become no tenth smaller in the last rounds.
+
+    Parameters
+    ----------
+    sizes : list of float
+        One of each round.
+    small : float
+    """
+    before, since = sizes[:-_STALLED], sizes[-_STALLED:]
+    return bool(before) and min(sizes) > small and min(since) > _NEARER * min(before)
+
+
+def _given_up(opened_m: list[float], hopeless_m: float, far_m: float) -> bool:
     """Whether the loops of the last rounds are so far open, and close so slowly, that they never will.
 
     Parameters
     ----------
     opened_m : list of float
         How far loops were open after each round.
-    hopeless_m, lost_m : float
-        How far they are open where they close no more, and where they are those of another robot.
+    hopeless_m, far_m : float
+        How far they are open where they close no more, and where they must come nearer.
     """
     if len(opened_m) == _PATIENT and opened_m[-1] > hopeless_m:
         return True
-    if len(opened_m) <= _STALLED:
-        return False
-    before, since = min(opened_m[:-_STALLED]), min(opened_m[-_STALLED:])
-    return min(before, since) > lost_m and since > _NEARER * before
+    return _no_nearer(opened_m, far_m)
 
 
 def _before_reading(unknowns: Unknowns, holds: Holds) -> Noise:

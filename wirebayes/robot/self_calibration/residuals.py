@@ -8,7 +8,7 @@ from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.self_calibration.equations import EXACT, FRICTIONLESS, Holds
 from wirebayes.robot.self_calibration.posterior import RobotPosterior
-from wirebayes.robot.self_calibration.trust import joint_test
+from wirebayes.robot.self_calibration.trust import SIGNIFICANT, joint_test
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 
 # Of the span: half a millimetre of five metres is thought of joint values before anything was read, as drums that wind
@@ -190,6 +190,11 @@ def leverage(found: RobotPosterior, rows: slice) -> Floats:
     alone = found.hold_covariance - from_robot
     own = np.einsum("pri,pij,prj->pr", by_hold, alone, by_hold)
     return own + np.einsum("pri,ij,prj->pr", total, found.covariance, total)
+
+
+def unusually_open(found: RobotPosterior) -> bool:
+    """Whether loops that nothing else is known of are so much further open than is usual that `trust` is lost."""
+    return 4.0 * _usual_noise(found) < SIGNIFICANT
 
 
 def _usual_noise(found: RobotPosterior) -> float:

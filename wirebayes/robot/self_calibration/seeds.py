@@ -18,7 +18,7 @@ from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.self_calibration.equations import Holds, State, moved
 from wirebayes.robot.self_calibration.estimate import estimate, progress_of, with_levels
 from wirebayes.robot.self_calibration.posterior import RobotPosterior
-from wirebayes.robot.self_calibration.residuals import lost, trust
+from wirebayes.robot.self_calibration.residuals import lost, trust, unusually_open
 from wirebayes.robot.self_calibration.strain import stretch
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.unknowns import Unknowns
@@ -213,10 +213,11 @@ def best(
         The same with poses that are no readings, but near which the first search begins.
     """
     unknowns = with_levels(unknowns, holds)
+    blind = not np.isfinite(holds.tension_N).any()
 
     def from_start(white: Floats, number: int, near: Holds = holds) -> RobotPosterior:
         watched = progress_of(progress, f"{called} {number}")
-        return estimate(unknowns, holds, seed(unknowns, near, white, rng), watched)
+        return estimate(unknowns, holds, seed(unknowns, near, white, rng), watched, others_follow=blind)
 
     begun = holds if about is None else about
     found = from_start(np.zeros(unknowns.count), 1, begun)
@@ -228,25 +229,39 @@ def best(
             white = _near_file(unknowns, rng)
         other = from_start(white, k + 2)
         likelier = other.evidence > found.evidence
-        if likelier and not (other.converged or lost(other)):  # only short of rounds
+        if likelier and not (_ended(other) or unusually_open(other)):  # only short of rounds
             other = estimate(unknowns, holds, other.state)
         if other.converged > found.converged or other.evidence > found.evidence:
             found = other
-    if np.isfinite(holds.tension_N).any():
+    if not blind:
         return found
     for k in range(_HANGING):
-        if _explains(found):
-            return found
-        white = np.zeros(unknowns.count)
-        if k > 0 and found.converged:
-            white = np.array(found.state.white)
+        nothing_new = k > 0 and not found.converged  # it would begin where the first one did
+        if _explains(found) or nothing_new:
+            break
+        white = np.array(found.state.white) if k > 0 else np.zeros(unknowns.count)
         hanging = hanging_state(unknowns, holds, seed(unknowns, begun, white, rng))
+        if not _slack(hanging):
+            continue
         watched = progress_of(progress, f"{called} {_OTHERS + 2 + k}")
-        other = estimate(unknowns, holds, hanging, watched)
+        other = estimate(unknowns, holds, hanging, watched, others_follow=True)
         as_good = found.converged and trust(found) >= trust(other)
         if other.converged and not as_good:
             found = other
-    return found
+    if _ended(found) or not unusually_open(found):
+        return found
+    # given up in favour of the others
+    return estimate(unknowns, holds, found.state, progress_of(progress, f"{called} continued"))
+
+
+def _ended(found: RobotPosterior) -> bool:
+    """Whether a search came to rest or to another robot."""
+    return found.converged or lost(found)
+
+
+def _slack(state: State) -> bool:
+    """Whether any wire is slack: else poses in balance are none that the searches before could not come to."""
+    return bool((state.pull_N < 0.0).any())
 
 
 def _explains(found: RobotPosterior) -> bool:
