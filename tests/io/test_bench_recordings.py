@@ -113,6 +113,26 @@ def test_a_recording_becomes_holds_of_thinned_readings(tmp_path):
     assert all(value in recorded for row in readings for value in row[3:])  # readings are kept, not averaged
 
 
+@pytest.mark.parametrize("pause", [None, (180.0, 190.0), (170.0, 200.0)])
+def test_a_pause_of_the_recording_over_a_move_is_said(pause, tmp_path):
+    rng = np.random.default_rng(2)
+    x, time, _ = record(Pull(holds=5), rng)  # from hold 3 to hold 4 at 182 s
+    in_hold = (time > 80.0) & (time < 100.0)  # a pause that hides no move matters to no hold
+    left = ~in_hold if pause is None else ~in_hold & ((time < pause[0]) | (time > pause[1]))
+    tension = 2.0 * x + rng.normal(0.0, 0.01, len(x))
+    rows = [f"{t:.1f}\t{a:.4f}\t{f:.3f}\n" for t, a, f in zip(time[left], x[left], tension[left], strict=True)]
+    path = tmp_path / "raw.txt"
+    path.write_text("Time (s)\tExtension (mm)\tLoad (N)\n" + "".join(rows))
+    made = convert(path, About("wire", "line", 1000.0), Choices())
+    assert len(made.experiment.holds) == 5
+    said = [notice.text for notice in made.warnings if "pauses" in notice.text]
+    if pause is None:
+        assert not said
+    else:
+        assert [notice.kind for notice in made.warnings] == ["hold-ends"]
+        assert said[0].startswith(f"the recording pauses before hold 4, for up to {pause[1] - pause[0]:.0f}")
+
+
 WIRE = {"k1": 1200.0, "B": 0.5, "U": 0.8, "k2": 0.03, "N": 0.7, "preload": 0.4, "sensor_sd": 0.0, "setting_sd": 0.0}
 
 

@@ -51,7 +51,8 @@ def simulate_command(
         typer.Option(
             "--parameter",
             metavar="NAME=VALUE",
-            help="A true value, for example k1=700; others are drawn from the prior.",
+            help="A true value, for example k1=700; others are drawn from the prior. With several lengths B is that of "
+            "their geometric mean.",
         ),
     ] = None,
     effect: Annotated[

@@ -68,7 +68,8 @@ def simulate_tests(
     resolution : float
         Rounding of the tensions, N, or of the displacements under weights, mm; 0 for none.
     parameters : mapping of name to value, optional
-        Such as ``{"k1": 700}``; parameters not given are drawn from the prior.
+        Such as ``{"k1": 700}``; parameters not given are drawn from the prior. With several lengths ``B`` is that of
+        their geometric mean, as in a fit of them together; ``truth.json`` has it for each.
     effects : mapping of ``NAME.p`` to value, or sequence of ``NAME.p=VALUE`` or ``NAME``
         Such as ``{"strain_stiffening.c": 12}`` or ``["grip_slip@7.w=0.2"]``; drawn from the prior without a value.
     own_effects : path, optional

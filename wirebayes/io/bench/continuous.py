@@ -13,7 +13,7 @@ from wirebayes.io.bench.plateaus import FEWEST, Plateau, noise_of, plateaus
 from wirebayes.io.bench.recorded import BEGUN_BEFORE, CONTINUOUS, PAUSE, Cut, Cycles, Readings, level_of
 from wirebayes.numeric.typing import Floats, Ints
 from wirebayes.result_warnings import Notice
-from wirebayes.sentences import counted, short
+from wirebayes.sentences import counted, short, some_of
 
 ARRIVING = 2  # readings by which the end of a move is known: none of them counts
 LONG = 10  # times as many readings: shorter holds have none to spare
@@ -63,7 +63,7 @@ def by_plateaus(readings: Readings, resets: Sequence[str]) -> Cut:
         of_test=True,
         notes=notes,
         clock_s=time,
-        warnings=_slow(np.array(moves), np.array(durations)),
+        warnings=(*_slow(np.array(moves), np.array(durations)), *_unseen_moves(time, found_holds, moves)),
         cycles=cycles,
     )
 
@@ -227,6 +227,29 @@ def _slow(moves_s: Floats, held_s: Floats) -> tuple[Notice, ...]:
         "intervals say, and discover may name effects that the moves made: move faster or hold longer"
     )
     return (Notice("left-out", text),)
+
+
+def _unseen_moves(time: Floats, found_holds: Sequence[Plateau], moves_s: Sequence[float]) -> tuple[Notice, ...]:
+    """A notice that the recording paused while the wire was moved to some holds, (H,), where moves to others are in it.
+
+    Where it always pauses, the notes say so.
+    """
+    usual_s = float(np.median(moves_s))
+    pauses: dict[int, float] = {}
+    for number, hold in enumerate(found_holds[1:], start=2):
+        pause_s = float(time[hold.begin] - time[found_holds[number - 2].left - 1])
+        if moves_s[number - 1] == 0.0 and pause_s > usual_s:
+            pauses[number] = pause_s
+    if usual_s == 0.0 or not pauses:
+        return ()
+    holds = some_of([str(number) for number in pauses])
+    longest = short(max(pauses.values()), 3)
+    text = (
+        f"the recording pauses before hold{'s' * (len(pauses) > 1)} {holds}, for up to {longest} s, and the move "
+        "is not in it: such a hold is taken to begin at its first reading, and the hold before it to last "
+        "until then; where the wire was moved earlier, creep rates are off by more than their intervals say"
+    )
+    return (Notice("hold-ends", text),)
 
 
 def _check_only_hold(readings: Readings, hold: Plateau) -> None:
