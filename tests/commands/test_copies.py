@@ -1,12 +1,17 @@
 """Readings that stand twice in what is judged together would count twice."""
 
+from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 import wirebayes as wb
-from wirebayes.io.experiment import Experiment, refuse_copies
+from wirebayes.inference.policy import Policy
+from wirebayes.io.checked_test import CheckedTest
+from wirebayes.io.data_checks import LEAST_DIFFERENT, copied_tests
+from wirebayes.io.experiment import Experiment
+
+FEW = Policy(walkers=32, ess=300, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
 
 
 @pytest.fixture
@@ -16,24 +21,32 @@ def twice() -> list[Experiment]:
     return [test, replace(test, name="copy", length_mm=2.0 * test.length_mm)]
 
 
-def test_readings_that_stand_twice_are_not_judged_together(twice: list[Experiment], tmp_path: Path) -> None:
-    found = "experiment copy, key readings: found the readings of experiment wire"
-    with pytest.raises(wb.InputError, match=found):
-        wb.fit(twice, together=twice[0].material, output=tmp_path / "fit")
-    with pytest.raises(wb.InputError, match=found):
-        wb.discover(twice, output=tmp_path / "discover")
-    assert not list(tmp_path.iterdir())
+def _copied(tests: Sequence[Experiment]) -> list[str]:
+    """Names of tests that are said to be copies."""
+    return list(copied_tests({e.name: CheckedTest(e.protocol(), e.readings(), e.resolution) for e in tests}))
+
+
+def test_a_copy_is_warned_of_where_both_are_judged_together(twice: list[Experiment]) -> None:
+    fitted = wb.fit(twice, together=twice[0].material, policy=FEW)
+    found = wb.discover(twice, policy=FEW, simulations=19).summary()["experiments"]
+    said = {name: found[name]["warnings"] for name in ("wire", "copy")}
+    assert [w["kind"] for w in said["copy"] if "experiment wire once more" in w["text"]] == ["data"]
+    assert not [w for w in said["wire"] if "once more" in w["text"]]
+    text = str(fitted.summary())
+    assert "copy: its readings are those of experiment wire once more" in text
 
 
 def test_other_readings_of_the_same_settings_are_no_copy(twice: list[Experiment]) -> None:
     (other,) = wb.simulate_tests(displacements=range(1, 5), seed=2).experiments
-    refuse_copies([twice[0], replace(other, name="other")])
+    assert _copied(twice) == ["copy"]
+    assert not _copied([twice[0], replace(other, name="other")])
 
 
-def test_few_readings_may_agree_by_chance(twice: list[Experiment]) -> None:
+@pytest.mark.parametrize("readings", [LEAST_DIFFERENT - 1, LEAST_DIFFERENT])
+def test_few_readings_may_agree_by_chance(twice: list[Experiment], readings: int) -> None:
     short = []
     for test in twice:
         hold = test.holds[0]
-        begun = replace(hold, time_s=hold.time_s[:3], readings=hold.readings[:3])
+        begun = replace(hold, time_s=hold.time_s[:readings], readings=hold.readings[:readings])
         short.append(replace(test, holds=(begun,)))
-    refuse_copies(short)
+    assert bool(_copied(short)) == (readings >= LEAST_DIFFERENT)

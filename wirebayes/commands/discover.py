@@ -21,7 +21,7 @@ from wirebayes.discovery.search import catalogue_without, investigate
 from wirebayes.discovery.settings import SIMULATIONS, Settings
 from wirebayes.effects import catalogue, source_of
 from wirebayes.inference.policy import DEFAULT, Policy
-from wirebayes.io.experiment import Experiment, refuse_copies
+from wirebayes.io.experiment import Experiment
 from wirebayes.io.next_hold import write_next_hold
 from wirebayes.io.run_folder import open_run, read_json, write_bytes, write_json
 from wirebayes.json_files.discovery import IntervalJson, ParameterReport
@@ -111,7 +111,6 @@ def discover(
     seed, train_holds = check_seed(seed), check_train_holds(train_holds)
     own, left_out = path_of(own_effects), names_given(without)
     experiments = experiments_of(source, experiment, train_holds=train_holds, drop_breaks=drop_breaks)
-    refuse_copies(experiments)
     kinds = catalogue_without(left_out, catalogue(own))
     build(experiments, (), spec)  # checks priors
     configuration = {

@@ -22,7 +22,7 @@ from wirebayes.discovery.model_check import checked_meanwhile, write_checks
 from wirebayes.effects import catalogue, effect_named, source_of
 from wirebayes.errors import InputError
 from wirebayes.inference.policy import DEFAULT, Policy
-from wirebayes.io.experiment import Experiment, refuse_copies
+from wirebayes.io.experiment import Experiment
 from wirebayes.io.next_hold import write_next_holds
 from wirebayes.io.run_folder import open_run
 from wirebayes.model.build import build
@@ -223,7 +223,6 @@ def _groups(experiments: Sequence[Experiment], together: str | None, file: Path)
     if not members:
         materials = ", ".join(sorted({experiment.material for experiment in experiments}))
         raise InputError(f"--together {together}: no such material in {file}; it has {materials}")
-    refuse_copies(members)
     return {members[0].material_folder: members}
 
 

@@ -32,6 +32,8 @@ from wirebayes.effects import CATALOGUE
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
+from wirebayes.io.checked_test import CheckedTest
+from wirebayes.io.data_checks import copied_tests
 from wirebayes.io.experiment import Experiment, by_material
 from wirebayes.json_files.discovery import (
     AmplitudeEstimate,
@@ -175,19 +177,30 @@ def _own_reports(
     """What the report says of each experiment of block `i` apart from the others."""
     block = gate.blocks[i]
     names = [a.name for a in answer.accepted]
+    copied = _copied(gate)
     checks = shrinking.shrinking(block, answer.stages, names, answer.remains, left_out, rng, parallel_map)
     reports: dict[str, HeldOutReport] = {}
     for e, check in zip(block.experiments, checks, strict=True):
         struck = [g for g in gate.struck if g["experiment"] == e.name]
+        notices = [*map(gross_errors.in_words, struck), *copied.get(e.name, ()), *_few_holds(e)]
         own: HeldOutReport = {
             "steps": check.steps,
             "held_out": check.held_out,
             "residual_rms_N": shrinking.residual_rms(block, e.name),
             "gross_errors": struck,
-            "warnings": to_json([*map(gross_errors.in_words, struck), *_few_holds(e)]),
+            "warnings": to_json(notices),
         }
         reports[e.name] = in_unit(own, READ_UNIT[e.control])
     return reports
+
+
+def _copied(gate: Gate) -> dict[str, list[Notice]]:
+    """What is said of each experiment, by name, that has the readings of an earlier one."""
+    tests = {}
+    for block in gate.blocks:
+        for e in block.experiments:
+            tests[e.name] = CheckedTest(e.protocol(), e.readings(), e.resolution)
+    return copied_tests(tests)
 
 
 def _few_holds(e: Experiment) -> list[Notice]:

@@ -4,7 +4,7 @@ What is certainly wrong is refused where the file is read (`wirebayes.io.reading
 a warning here.
 """
 
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 
 import numpy as np
 
@@ -31,6 +31,7 @@ SHRINKING_HOLDS = 4  # no wire shrinks under a load: fewer are enough, if all of
 JUMP, JUMP_STAYS = 2.0, 0.2  # times the changes before and after it; share of it that is left to the hold's end
 FASTER = 5.0  # times the speed of the changes before and after it, which neither creep gains and loses nor a misprint
 COPIED = 3  # different readings that agree one by one at two displacements: not by chance
+LEAST_DIFFERENT = 4  # different readings that agree one by one in two tests: not by chance
 OFF_GRID = 0.5  # share of the changes between readings that are smaller than half the resolution
 
 ONE_SETTING = 0.01  # of the setting: with .3 % between holds k1 is as open as with none
@@ -75,6 +76,26 @@ def of_experiment(experiment: Experiment) -> list[Notice]:
     found = slack_by_preload(protocol, readings, experiment.resolution, preload_mm)
     found += warnings(protocol, readings, experiment.resolution)
     return [*found, *one_setting(protocol, set(experiment.priors))]
+
+
+def copied_tests(tests: Mapping[str, CheckedTest]) -> dict[str, list[Notice]]:
+    """What is said of each of several tests, by name, whose settings and readings are those of an earlier one.
+
+    Judged together, they count twice.
+    """
+    names: dict[tuple[bytes, bytes], str] = {}
+    found: dict[str, list[Notice]] = {}
+    for name, test in tests.items():
+        read = test.values[test.protocol.mask]
+        settings = test.protocol.setting[test.protocol.recorded]
+        first = names.setdefault((settings.tobytes(), read.tobytes()), name)
+        if first != name and np.unique(read).size >= LEAST_DIFFERENT:
+            text = (
+                f"its readings are those of experiment {first} once more: judged together they count twice, and "
+                "intervals are too narrow; leave one of the two out"
+            )
+            found[name] = [Notice("data", text)]
+    return found
 
 
 def one_setting(protocol: Protocol, stated: Set[str]) -> list[Notice]:

@@ -175,34 +175,12 @@ LEAST_READINGS = 3  # level, slope and curvature of one relaxation
 ENOUGH = f"at least one recorded hold and {LEAST_READINGS} readings in all"
 
 
-LEAST_DIFFERENT = 4  # readings that agree one by one in two tests: not by chance
-
-
 def by_material(experiments: Sequence[Experiment]) -> dict[str, list[Experiment]]:
     """The experiments of each material, in the order given."""
     materials: dict[str, list[Experiment]] = {}
     for experiment in experiments:
         materials.setdefault(experiment.material, []).append(experiment)
     return materials
-
-
-def refuse_copies(experiments: Sequence[Experiment]) -> None:
-    """Refuse experiments that are judged together and have the same readings, which would count twice.
-
-    Raises
-    ------
-    InputError
-    """
-    known: dict[tuple[Any, ...], str] = {}
-    for experiment in experiments:
-        holds = tuple((hold.setting, tuple(hold.readings.tolist())) for hold in experiment.recorded_holds)
-        different = {value for _, readings in holds for value in readings}
-        first = known.setdefault(holds, experiment.name)
-        if first != experiment.name and len(different) >= LEAST_DIFFERENT:
-            raise InputError(
-                f"{experiment.source}, experiment {experiment.name}, key readings: found the readings of experiment "
-                f"{first} once more, which would count twice, expected those of another test (--experiment takes one)"
-            )
 
 
 def enough(holds: Sequence[Hold]) -> bool:

@@ -66,6 +66,14 @@ def posterior_warnings(fit: Fit, sample: Sample) -> list[Notice]:
     return [*of_readings, *of_posterior(own, prior, sample), *of_prior]
 
 
+def copied_samples(fit: Fit) -> dict[str, list[Notice]]:
+    """What is said of each sample of a fit, by name, that has the readings of an earlier one."""
+    tests = {}
+    for sample in fit.problem.samples:
+        tests[sample.name] = CheckedTest(sample.protocol, sample.readings[..., 0], sample.resolution)
+    return data_checks.copied_tests(tests)
+
+
 def _columns_of(problem: Problem, sample: Sample) -> list[str]:
     """The columns of a sample of which somebody may know something to state."""
     control = sample.protocol.control

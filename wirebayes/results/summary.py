@@ -59,11 +59,13 @@ def statistics(values: Array) -> Mixed:
 def _warnings(fit: Fit, sample: Sample | None, ends: HoldEnds | None) -> list[NoticeJson]:
     """Notices that the fit has not converged and of what is suspicious, with the experiment where there are several."""
     found = [] if fit.chains.converged else [Notice("not-converged", fit.chains.why)]
+    copied = posterior_checks.copied_samples(fit)
     if sample is not None:
-        found += posterior_checks.posterior_warnings(fit, sample)
+        found += [*copied.get(sample.name, ()), *posterior_checks.posterior_warnings(fit, sample)]
     else:
         for one in fit.problem.samples:
-            found += [notice.of(one.name) for notice in posterior_checks.posterior_warnings(fit, one)]
+            own = [*copied.get(one.name, ()), *posterior_checks.posterior_warnings(fit, one)]
+            found += [notice.of(one.name) for notice in own]
     return to_json([*found, *hold_ends.hold_ends_notice(ends)])
 
 
