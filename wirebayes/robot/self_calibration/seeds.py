@@ -212,46 +212,81 @@ def best(
     about : Holds, optional
         The same with poses that are no readings, but near which the first search begins.
     """
-    unknowns = with_levels(unknowns, holds)
-    blind = not np.isfinite(holds.tension_N).any()
-
-    def from_start(white: Floats, number: int, near: Holds = holds) -> RobotPosterior:
-        watched = progress_of(progress, f"{called} {number}")
-        return estimate(unknowns, holds, seed(unknowns, near, white, rng), watched, others_follow=blind)
-
-    begun = holds if about is None else about
-    found = from_start(np.zeros(unknowns.count), 1, begun)
-    for k in range(_OTHERS):
-        if _explains(found):
-            return found
-        white = np.array(found.state.white)  # holds that went astray are looked for again
-        if k > 0:
-            white = _near_file(unknowns, rng)
-        other = from_start(white, k + 2)
-        likelier = other.evidence > found.evidence
-        if likelier and not (_ended(other) or unusually_open(other)):  # only short of rounds
-            other = estimate(unknowns, holds, other.state)
-        if other.converged > found.converged or other.evidence > found.evidence:
-            found = other
-    if not blind:
+    starts = _Starts(with_levels(unknowns, holds), holds, holds if about is None else about, rng, progress, called)
+    found = starts.of_file()
+    found = starts.near_file(found)
+    if not starts.blind:
         return found
-    for k in range(_HANGING):
-        nothing_new = k > 0 and not found.converged  # it would begin where the first one did
-        if _explains(found) or nothing_new:
-            break
-        white = np.array(found.state.white) if k > 0 else np.zeros(unknowns.count)
-        hanging = hanging_state(unknowns, holds, seed(unknowns, begun, white, rng))
-        if not _slack(hanging):
-            continue
-        watched = progress_of(progress, f"{called} {_OTHERS + 2 + k}")
-        other = estimate(unknowns, holds, hanging, watched, others_follow=True)
-        as_good = found.converged and trust(found) >= trust(other)
-        if other.converged and not as_good:
-            found = other
-    if _ended(found) or not unusually_open(found):
+    found = starts.in_balance(found)
+    given_up = unusually_open(found) and not _ended(found)
+    return starts.continued(found) if given_up else found
+
+
+@dataclass(frozen=True)
+class _Starts:
+    """Searches from several starts, each of which is asked for only where what was found before explains too little.
+
+    Attributes
+    ----------
+    begun : Holds
+        Those whose poses the searches about the file's geometry begin near.
+    """
+
+    unknowns: Unknowns
+    holds: Holds
+    begun: Holds
+    rng: Generator
+    progress: Progress
+    called: str
+
+    @property
+    def blind(self) -> bool:
+        """Whether no tension was read: poses with slack wires are then hard to come to."""
+        return not bool(np.isfinite(self.holds.tension_N).any())
+
+    def of_file(self) -> RobotPosterior:
+        """From the file's geometry."""
+        return self._searched(seed(self.unknowns, self.begun, np.zeros(self.unknowns.count), self.rng), 1)
+
+    def near_file(self, found: RobotPosterior) -> RobotPosterior:
+        """From other geometries: first what was found, where holds that went astray are looked for again."""
+        for k in range(_OTHERS):
+            if _explains(found):
+                break
+            white = _near_file(self.unknowns, self.rng) if k > 0 else np.array(found.state.white)
+            other = self._searched(seed(self.unknowns, self.holds, white, self.rng), k + 2)
+            likelier = other.evidence > found.evidence
+            if likelier and not (_ended(other) or unusually_open(other)):  # only short of rounds
+                other = estimate(self.unknowns, self.holds, other.state)
+            if other.converged > found.converged or other.evidence > found.evidence:
+                found = other
         return found
-    # given up in favour of the others
-    return estimate(unknowns, holds, found.state, progress_of(progress, f"{called} continued"))
+
+    def in_balance(self, found: RobotPosterior) -> RobotPosterior:
+        """From poses in balance in which some wire is slack: of the file's geometry, then of what was found."""
+        for k in range(_HANGING):
+            nothing_new = k > 0 and not found.converged
+            if _explains(found) or nothing_new:
+                break
+            white = np.array(found.state.white) if k > 0 else np.zeros(self.unknowns.count)
+            near = seed(self.unknowns, self.begun, white, self.rng)
+            hanging = hanging_state(self.unknowns, self.holds, near)
+            if not _slack(hanging):
+                continue
+            other = self._searched(hanging, _OTHERS + 2 + k)
+            as_good = found.converged and trust(found) >= trust(other)
+            if other.converged and not as_good:
+                found = other
+        return found
+
+    def continued(self, found: RobotPosterior) -> RobotPosterior:
+        """The search that was given up in favour of others, none of which ended."""
+        watched = progress_of(self.progress, f"{self.called} continued")
+        return estimate(self.unknowns, self.holds, found.state, watched)
+
+    def _searched(self, state: State, number: int) -> RobotPosterior:
+        watched = progress_of(self.progress, f"{self.called} {number}")
+        return estimate(self.unknowns, self.holds, state, watched, others_follow=self.blind)
 
 
 def _ended(found: RobotPosterior) -> bool:
