@@ -506,18 +506,20 @@ def test_what_leaves_the_tests_is_said_of_the_whole_request(monkeypatch: pytest.
 
     monkeypatch.setattr(answer.wire_doubts, "wire_warnings", tested)
     monkeypatch.setattr(answer.sag, "sag_warnings", sagging)
+    monkeypatch.setattr(answer.plausible, "pose_notices", lambda robot, position_m, rotation: ["short"])
     monkeypatch.setattr(answer.drums, "emptied", emptied)
     request = PoseRequest(np.zeros(3), np.eye(3), np.array([0.0, 10.0, 90.0]))
     commands: Any = SimpleNamespace(
         zero_m=np.ones((2, 1)), joint_m=np.array([[1.0], [2.0]]), feasible=np.array([False, True])
     )
     tension = np.array([[5.0]])
-    for known, words in ((None, ["line", "sag"]), (SimpleNamespace(wire_m=np.array([4.0])), ["line", "sag", None])):
+    of_wires = ["line", "sag", "short"]
+    for known, words in ((None, of_wires), (SimpleNamespace(wire_m=np.array([4.0])), [*of_wires, None])):
         asked.clear()
         robot: Any = SimpleNamespace(drums=known)
         held = answer._Held(robot, None, None, request, commands, tension)  # type: ignore[arg-type]
         found = answer._untested(held)
-        assert found[:2] == words[:2] and len(found) == len(words)
+        assert found[:3] == of_wires and len(found) == len(words)
         assert asked[:2] == [([[5.0]], 90.0, [[1.0], [1.0]]), (request.position_m, [5.0])]
         assert asked[2:] == ([] if known is None else [[[2.0]]])
 
