@@ -515,7 +515,7 @@ def test_motor_angles_may_be_negative_but_not_the_lengths_they_pay_out():
     with pytest.raises(InputError) as caught:
         table.parse_log(csv_table(Path("log.csv"), good.replace("9,-125", "9,125")), robot, table.measured_columns)
     wrong = "line 3, column 2 (motor_1_rad): found '125', which pays out -6.25 m, expected a length above 0"
-    wrong += "; the motor's angle is in radians, from nothing paid out"
+    wrong += "; the motor's angle is in radians, zero where no wire is paid out"
     assert str(caught.value) == f"log.csv, {wrong}"
 
 

@@ -19,7 +19,7 @@ from wirebayes.cli.options import (
     folder_for,
 )
 
-Files = Annotated[list[Path], typer.Argument(metavar="FILE.toml...", help="Experiment files.")]
+Files = Annotated[list[Path], typer.Argument(metavar="FILE.toml", help="Experiment files.")]
 
 
 def batch_command(

@@ -12,7 +12,9 @@ Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A folder written by
 ProtocolFile = Annotated[
     Path,
     typer.Argument(
-        metavar="PROTOCOL.csv", help="With columns hold,displacement_mm,time_s[,temperature_C][,tension_N]."
+        metavar="PROTOCOL.csv",
+        help="With columns hold,displacement_mm,time_s[,temperature_C][,tension_N]; under weights, "
+        "displacement_mm and tension_N swap roles.",
     ),
 ]
 ModelOption = Annotated[

@@ -100,7 +100,7 @@ def joint_unit_told(name: str) -> str:
         Of its column.
     """
     if name.startswith(_MOTOR):
-        return "; the motor's angle is in radians, from nothing paid out"
+        return "; the motor's angle is in radians, zero where no wire is paid out"
     return "; straight lengths are in millimetres" if name.startswith(_STRAIGHT) else ""
 
 
