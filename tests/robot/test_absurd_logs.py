@@ -17,6 +17,7 @@ from wirebayes.robot.self_calibration.answer import calibration_report
 from wirebayes.robot.self_calibration.equations import Holds, Noise, State
 from wirebayes.robot.self_calibration.search import StatedPoses
 from wirebayes.robot.self_calibration.session import LengthPrior
+from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
 from wirebayes.strict.columns import columns_table
 
@@ -129,9 +130,11 @@ def test_unknowns_that_come_no_tenth_nearer_to_rest_in_ten_rounds_go_to_and_fro(
     assert estimate._no_nearer(moved, estimate._STILL) is circling
 
 
-@pytest.mark.parametrize(("converges", "finer"), [(True, 4), (False, 49)])
-def test_a_search_that_goes_to_and_fro_goes_on_with_slopes_by_every_tension(monkeypatch, converges, finer):
-    """It then has as many rounds as are left."""
+@pytest.mark.parametrize(
+    ("p", "converges", "finer"), [(SIGNIFICANT, True, 4), (SIGNIFICANT, False, 49), (0.99 * SIGNIFICANT, False, 0)]
+)
+def test_a_search_that_goes_to_and_fro_goes_on_with_slopes_by_every_tension(monkeypatch, p, converges, finer):
+    """It then has as many rounds as are left; where it explains nothing that was read, it ends."""
     each = []
 
     def a_round(search):
@@ -146,6 +149,7 @@ def test_a_search_that_goes_to_and_fro_goes_on_with_slopes_by_every_tension(monk
     monkeypatch.setattr(estimate._Search, "_settled", lambda search, found: True)
     monkeypatch.setattr(estimate._Search, "_leads_nowhere", lambda search, found: False)
     monkeypatch.setattr(estimate._Search, "_go_on", lambda search, *arguments: None)
+    monkeypatch.setattr(estimate, "trust", lambda found: p)
     found = _search().at_rest(lambda share: None)
     assert found.converged is converges
     assert (each.count(False), each.count(True)) == (11, finer)

@@ -27,10 +27,12 @@ from wirebayes.robot.self_calibration.residuals import (
     lost_m,
     most_open_m,
     noise_shown,
+    trust,
     unusually_open,
     usual_joint,
 )
 from wirebayes.robot.self_calibration.strain import Grown
+from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 
 _ROUNDS = 60  # of noise and creep: most end in ten
@@ -166,12 +168,13 @@ class _Search:
     def at_rest(self, progress: ShareDone) -> RobotPosterior:
         """The posterior where nothing moves on; not converged where the search is given up.
 
-        Slopes by every tension are right about the mode alone, so they come in once nothing moves without them, or
-        once what moves comes no nearer to rest.
+        Slopes by every tension are right about the mode alone, and dear, so they come in once nothing moves without
+        them, or once what moves about what was read comes no nearer to rest.
         """
         roughly, finely = shares_of(progress, 2)
         found = self._until_still(_ROUNDS, roughly)
-        if not (self.unknowns.prior.creeps and (found.converged or self.circling)):
+        promising = self.circling and trust(found) >= SIGNIFICANT
+        if not (self.unknowns.prior.creeps and (found.converged or promising)):
             return found
         most = _FINER_ROUNDS if found.converged else _ROUNDS - len(self.rounds)
         self.each = True
