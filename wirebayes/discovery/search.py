@@ -32,8 +32,6 @@ from wirebayes.effects import CATALOGUE
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
-from wirebayes.io.checked_test import CheckedTest
-from wirebayes.io.data_checks import copied_tests
 from wirebayes.io.experiment import Experiment, by_material
 from wirebayes.json_files.discovery import (
     AmplitudeEstimate,
@@ -48,6 +46,7 @@ from wirebayes.model.scales import scales_of
 from wirebayes.processes.workers import ParallelMap
 from wirebayes.progress import Progress, silent
 from wirebayes.result_warnings import Notice, notices_by_part, to_json
+from wirebayes.results.posterior_checks import copied_samples
 from wirebayes.sentences import counted
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.effect import Effect, EventEffect, Kinds
@@ -177,7 +176,7 @@ def _own_reports(
     """What the report says of each experiment of block `i` apart from the others."""
     block = gate.blocks[i]
     names = [a.name for a in answer.accepted]
-    copied = _copied(gate)
+    copied = copied_samples(sample for each in gate.blocks for sample in each.target.problem.samples)
     checks = shrinking.shrinking(block, answer.stages, names, answer.remains, left_out, rng, parallel_map)
     reports: dict[str, HeldOutReport] = {}
     for e, check in zip(block.experiments, checks, strict=True):
@@ -192,15 +191,6 @@ def _own_reports(
         }
         reports[e.name] = in_unit(own, READ_UNIT[e.control])
     return reports
-
-
-def _copied(gate: Gate) -> dict[str, list[Notice]]:
-    """What is said of each experiment, by name, that has the readings of an earlier one."""
-    tests = {}
-    for block in gate.blocks:
-        for e in block.experiments:
-            tests[e.name] = CheckedTest(e.protocol(), e.readings(), e.resolution)
-    return copied_tests(tests)
 
 
 def _few_holds(e: Experiment) -> list[Notice]:

@@ -3,7 +3,7 @@
 Before the fit `wirebayes.io.data_checks` looks at the readings alone.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -66,10 +66,10 @@ def posterior_warnings(fit: Fit, sample: Sample) -> list[Notice]:
     return [*of_readings, *of_posterior(own, prior, sample), *of_prior]
 
 
-def copied_samples(fit: Fit) -> dict[str, list[Notice]]:
-    """What is said of each sample of a fit, by name, that has the readings of an earlier one."""
+def copied_samples(samples: Iterable[Sample]) -> dict[str, list[Notice]]:
+    """What is said of each of several samples, by name, that has the readings of an earlier one."""
     tests = {}
-    for sample in fit.problem.samples:
+    for sample in samples:
         tests[sample.name] = CheckedTest(sample.protocol, sample.readings[..., 0], sample.resolution)
     return data_checks.copied_tests(tests)
 

@@ -59,7 +59,7 @@ def statistics(values: Array) -> Mixed:
 def _warnings(fit: Fit, sample: Sample | None, ends: HoldEnds | None) -> list[NoticeJson]:
     """Notices that the fit has not converged and of what is suspicious, with the experiment where there are several."""
     found = [] if fit.chains.converged else [Notice("not-converged", fit.chains.why)]
-    copied = posterior_checks.copied_samples(fit)
+    copied = posterior_checks.copied_samples(fit.problem.samples)
     if sample is not None:
         found += [*copied.get(sample.name, ()), *posterior_checks.posterior_warnings(fit, sample)]
     else:

@@ -4,6 +4,7 @@ A wire creeps while it moves, to first order as if the whole move were made at t
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -230,22 +231,33 @@ def _slow(moves_s: Floats, held_s: Floats) -> tuple[Notice, ...]:
 
 
 def _unseen_moves(time: Floats, found_holds: Sequence[Plateau], moves_s: Sequence[float]) -> tuple[Notice, ...]:
-    """A notice that the recording paused while the wire was moved to some holds, (H,), where moves to others are in it.
+    """A notice that the recording paused over the moves to some holds, while it shows those to others.
 
-    Where it always pauses, the notes say so.
+    If it always pauses, the notes say so.
+
+    Parameters
+    ----------
+    time : array
+        Of the readings, s.
+    found_holds : sequence of Plateau, of length H
+    moves_s : (H,) sequence of float
+        How long the recording shows the wire moving to each hold, 0 where it shows nothing.
     """
     usual_s = float(np.median(moves_s))
-    pauses: dict[int, float] = {}
-    for number, hold in enumerate(found_holds[1:], start=2):
-        pause_s = float(time[hold.begin] - time[found_holds[number - 2].left - 1])
-        if moves_s[number - 1] == 0.0 and pause_s > usual_s:
-            pauses[number] = pause_s
-    if usual_s == 0.0 or not pauses:
+    if usual_s == 0.0:
         return ()
+    pauses: dict[int, float] = {}
+    for i, (before, hold) in enumerate(pairwise(found_holds), start=1):
+        pause_s = float(time[hold.begin] - time[before.left - 1])
+        if moves_s[i] == 0.0 and pause_s > usual_s:
+            pauses[i + 1] = pause_s
+    if not pauses:
+        return ()
+    plural = "s" if len(pauses) > 1 else ""
     holds = some_of([str(number) for number in pauses])
     longest = short(max(pauses.values()), 3)
     text = (
-        f"the recording pauses before hold{'s' * (len(pauses) > 1)} {holds}, for up to {longest} s, and the move "
+        f"the recording pauses before hold{plural} {holds}, for up to {longest} s, and the move "
         "is not in it: such a hold is taken to begin at its first reading, and the hold before it to last "
         "until then; where the wire was moved earlier, creep rates are off by more than their intervals say"
     )

@@ -157,7 +157,7 @@ def _short_wires(robot: Robot, position_m: Floats, rotation: Floats, where: str)
     first = legs[0]
     return (
         f"leg.wire_length_m of wire {first + 1}{_and_more(legs)}: {number(robot.wire_m[first])} m, less than the "
-        f"{number(lines_m[first])} m from exit point to platform at {where}"
+        f"{number(lines_m[first])} m of its lines from exit point to platform at {where}"
     )
 
 

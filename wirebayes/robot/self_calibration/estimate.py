@@ -104,7 +104,7 @@ def estimate(
         A rough guess.
     progress : function of a share between 0 and 1
     others_follow : bool
-        Whether other starts follow, so that a search is given up too where loops stay open unusually far.
+        Whether other starts follow: a search whose loops stay open unusually far then makes way for them.
     """
     noise = _before_reading(unknowns, holds)
     creep = creep_of(unknowns, holds, state, roughly=ROUGHLY)
@@ -143,8 +143,6 @@ class _Search:
         Whether creep follows the tension of every hold by itself (`strain.grown`).
     moved : list of float
         How far unknowns moved on in each round, in standard deviations.
-    circling : bool
-        Whether they come no nearer to rest.
     """
 
     def __init__(
@@ -155,7 +153,7 @@ class _Search:
         self.noise, self.state, self.creep = noise, state, creep
         self.passed = [state]
         self.roughly, self.cost = ROUGHLY, np.inf
-        self.came_down = self.each = self.circling = False
+        self.came_down = self.each = False
         self.rounds: list[tuple[Floats, Floats]] = []
         self.opened_m: list[float] = []
         self.moved: list[float] = []
@@ -168,12 +166,12 @@ class _Search:
     def at_rest(self, progress: ShareDone) -> RobotPosterior:
         """The posterior where nothing moves on; not converged where the search is given up.
 
-        Slopes by every tension are right about the mode alone, and dear, so they come in once nothing moves without
-        them, or once what moves about what was read comes no nearer to rest.
+        Slopes by every tension are expensive and right near the mode alone. So they come in once nothing moves on
+        without them, or once estimates that explain the readings come no nearer to rest.
         """
         roughly, finely = shares_of(progress, 2)
         found = self._until_still(_ROUNDS, roughly)
-        promising = self.circling and trust(found) >= SIGNIFICANT
+        promising = self._circling and trust(found) >= SIGNIFICANT
         if not (self.unknowns.prior.creeps and (found.converged or promising)):
             return found
         most = _FINER_ROUNDS if found.converged else _ROUNDS - len(self.rounds)
@@ -195,11 +193,15 @@ class _Search:
             if self._leads_nowhere(found):
                 break
             self.moved.append(moved_on)
-            self.circling = not self.each and _no_nearer(self.moved, _STILL)
-            if self.circling:
+            if self._circling:
                 break
             self._go_on(found, sd, moved_on)
         return replace(found, converged=False)
+
+    @property
+    def _circling(self) -> bool:
+        """Whether unknowns go to and fro and come no nearer to rest; not asked of slopes by every tension."""
+        return not self.each and _no_nearer(self.moved, _STILL)
 
     def _leads_nowhere(self, found: RobotPosterior) -> bool:
         """Whether further rounds would not come to what was read."""
@@ -248,13 +250,14 @@ class _Search:
 
 
 def _no_nearer(sizes: list[float], small: float = 0.0) -> bool:
-    """Whether what stayed larger than is small has become no tenth smaller in the last rounds.
+    """Whether sizes, none of them small, have fallen by less than a tenth in the last rounds.
 
     Parameters
     ----------
     sizes : list of float
         One of each round.
     small : float
+        A size up to which nothing is left to fall.
     """
     before, since = sizes[:-_STALLED], sizes[-_STALLED:]
     return bool(before) and min(sizes) > small and min(since) > _NEARER * min(before)

@@ -21,6 +21,7 @@ _FINEST = 1e-2  # of the usual error: no encoder with drum and wire does better
 # Of the span: loops that stay so far open belong to another robot, in another unit or another order. Layers on a drum
 # and a printer's anchors that are off by a decimetre leave less.
 _LOST = 0.01
+_TESTS = 4.0  # that share the level where nobody read tensions; those of all residuals are two of them
 _CONTRADICTED = 1e2  # mean squared residual: readings ten standard errors off
 _EXPLAINED = 3.0  # times the stated error of a joint value: loops that are no further open say nothing of the robot
 
@@ -39,7 +40,7 @@ def trust(found: RobotPosterior) -> float:
         return p
     free = unread.sum() - _taken_up(found)
     tensions = float(chdtrc(max(free, 1.0), _beyond_usual(found)))
-    return min(1.0, 2.0 * p, 4.0 * tensions, 4.0 * _usual_noise(found))  # p has the better of two tests times two
+    return min(1.0, 2.0 * p, _TESTS * tensions, _TESTS * _usual_noise(found))  # p has the better of two tests times two
 
 
 def lengths_tell(unknowns: Unknowns, read: Bools) -> bool:
@@ -193,8 +194,8 @@ def leverage(found: RobotPosterior, rows: slice) -> Floats:
 
 
 def unusually_open(found: RobotPosterior) -> bool:
-    """Whether loops that nothing else is known of are so much further open than is usual that `trust` is lost."""
-    return 4.0 * _usual_noise(found) < SIGNIFICANT
+    """Whether loops are open so much farther than is usual that `trust` is lost, where lengths alone were read."""
+    return _TESTS * _usual_noise(found) < SIGNIFICANT
 
 
 def _usual_noise(found: RobotPosterior) -> float:

@@ -228,13 +228,13 @@ class _Starts:
 
     Attributes
     ----------
-    begun : Holds
-        Those whose poses the searches about the file's geometry begin near.
+    about : Holds
+        The holds with the poses that searches from the file's geometry begin near.
     """
 
     unknowns: Unknowns
     holds: Holds
-    begun: Holds
+    about: Holds
     rng: Generator
     progress: Progress
     called: str
@@ -246,7 +246,7 @@ class _Starts:
 
     def of_file(self) -> RobotPosterior:
         """From the file's geometry."""
-        return self._searched(seed(self.unknowns, self.begun, np.zeros(self.unknowns.count), self.rng), 1)
+        return self._searched(seed(self.unknowns, self.about, np.zeros(self.unknowns.count), self.rng), 1)
 
     def near_file(self, found: RobotPosterior) -> RobotPosterior:
         """From other geometries: first what was found, where holds that went astray are looked for again."""
@@ -269,7 +269,7 @@ class _Starts:
             if _explains(found) or nothing_new:
                 break
             white = np.array(found.state.white) if k > 0 else np.zeros(self.unknowns.count)
-            near = seed(self.unknowns, self.begun, white, self.rng)
+            near = seed(self.unknowns, self.about, white, self.rng)
             hanging = hanging_state(self.unknowns, self.holds, near)
             if not _slack(hanging):
                 continue
@@ -295,7 +295,7 @@ def _ended(found: RobotPosterior) -> bool:
 
 
 def _slack(state: State) -> bool:
-    """Whether any wire is slack: else poses in balance are none that the searches before could not come to."""
+    """Whether any wire is slack: if none is, the searches from other poses could have come there, too."""
     return bool((state.pull_N < 0.0).any())
 
 
