@@ -216,6 +216,14 @@ def test_one_name_in_two_files_takes_the_files_name_with_it(experiment_file, tmp
         wb.batch([good, good], **QUICK)
 
 
+def test_names_that_differ_in_case_take_the_files_name_with_them(experiment_file, tmp_path, here):
+    good = experiment_file()
+    other = tmp_path / "f.toml"
+    other.write_text(good.read_text().replace("wire-a", "Wire-A"))
+    many = wb.batch([good, other], **QUICK)
+    assert [row["name"] for row in many.rows] == ["e.wire-a", "f.Wire-A"]
+
+
 def test_a_discovered_experiment_has_both_posteriors_and_a_verdict(tests, tmp_path, here):
     many = wb.batch(tests[0], policy=FEW, simulations=99, without=_all_but("toe"), output=tmp_path / "out")
     (row,) = rows_of(tmp_path / "out")

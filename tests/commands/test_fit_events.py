@@ -1,5 +1,7 @@
 """Events that a fit is asked for: at a hold of any of its tests, or of the one that is named."""
 
+from dataclasses import replace
+
 import pytest
 
 import wirebayes as wb
@@ -37,3 +39,15 @@ def test_an_event_may_name_its_test(pair: list[Experiment]) -> None:
 def test_an_event_at_no_hold_is_refused(pair: list[Experiment], effect: str, found: str) -> None:
     with pytest.raises(wb.InputError, match=f"--effect {effect}: {found}"):
         wb.fit(pair, together="line", effects=[effect], check=False, policy=FEW)
+
+
+def test_experiments_whose_folders_would_be_one_somewhere_are_refused(pair: list[Experiment]) -> None:
+    alike = [pair[0], replace(pair[1], name="First")]
+    with pytest.raises(wb.InputError, match="found first, First, expected names that differ more"):
+        wb.fit(alike, check=False, policy=FEW)
+
+
+def test_a_material_is_found_however_its_accents_are_written(pair: list[Experiment]) -> None:
+    cable = [replace(test, material="c\u00e2ble") for test in pair]
+    with pytest.raises(wb.InputError, match="effect toe@1"):  # the material is there, the effect is of no hold
+        wb.fit(cable, together="ca\u0302ble", effects=["toe@1"], check=False, policy=FEW)

@@ -242,6 +242,27 @@ def test_the_line_is_that_of_the_right_experiment(experiment_file):
     assert f"{path}, line 9, experiment wire-a, key name: found 'wire-a' a second time" in complaint(path)
 
 
+@pytest.mark.parametrize("other", ["Wire-A", "wire-a."])
+def test_names_whose_folders_would_be_one_somewhere_are_refused(experiment_file, other):
+    path = experiment_file()
+    first = path.read_text()
+    path.write_text(first + first.replace("wire-a", other))
+    text = complaint(path)
+    assert f"line 9, experiment {other}, key name: found '{other}' beside 'wire-a', expected another name" in text
+    path.write_text(first + first.replace("wire-a", "wire-b"))
+    assert [test.name for test in read_experiments(path)] == ["wire-a", "wire-b"]
+
+
+def test_two_spellings_of_one_letter_are_one_material(experiment_file):
+    path = experiment_file()
+    text = path.read_text()
+    (material,) = re.findall('material = "(.*)"', text)
+    composed = text.replace(material, "c\u00e2ble")
+    decomposed = text.replace(material, "ca\u0302ble").replace("wire-a", "wire-b")
+    path.write_text(composed + decomposed, encoding="utf-8")
+    assert [test.material for test in read_experiments(path)] == ["c\u00e2ble", "c\u00e2ble"]
+
+
 def test_files_that_cannot_be_read_are_named(experiment_file, tmp_path):
     path = experiment_file()
     assert "found no such file" in complaint(tmp_path / "absent.toml")

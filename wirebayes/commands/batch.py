@@ -27,7 +27,7 @@ from wirebayes.discovery.settings import SIMULATIONS
 from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
 from wirebayes.inference.policy import DEFAULT, Policy
-from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment import Experiment, folder_key
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.run_folder import check_run, open_run, read_json, write_bytes, write_csv, write_json, write_parquet
 from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
@@ -205,24 +205,24 @@ def _experiments(source: PathLike | Experiment, train_holds: int | None) -> list
 
 
 def _distinct(read: list[_WithFile]) -> list[_WithFile]:
-    """The experiments, those of one name with the name of their file before it."""
-    times = Counter(experiment.name for experiment, _ in read)
+    """The experiments, those whose folders would be one with the name of their file before their own."""
+    times = Counter(folder_key(experiment.name) for experiment, _ in read)
     distinct = []
-    by_name: dict[str, str] = {}
+    by_folder: dict[str, str] = {}
     for experiment, file in read:
         name = experiment.name
-        if times[name] > 1:
+        if times[folder_key(name)] > 1:
             stem = Path(file).stem
             name = f"{stem}.{name}"
             experiment = replace(experiment, name=name)
         taken = ""
-        if name in by_name:
-            taken = f"a second time (first in {by_name[name]})"
+        if folder_key(name) in by_folder:
+            taken = f"a second time (first in {by_folder[folder_key(name)]})"
         elif name in (TABLE, PARQUET):
             taken = "which is a file of the results"
         if taken:
             raise InputError(f"{file}: found the experiment {name} {taken}, expected another name")
-        by_name[name] = file
+        by_folder[folder_key(name)] = file
         distinct.append((experiment, file))
     return distinct
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
+from unicodedata import normalize
 
 from wirebayes._version import __version__
 from wirebayes.commands.options import (
@@ -219,7 +220,8 @@ def _groups(experiments: Sequence[Experiment], together: str | None, file: Path)
     """The experiments of each fit, by its folder."""
     if together is None:
         return {experiment.name: (experiment,) for experiment in experiments}
-    members = tuple(experiment for experiment in experiments if experiment.material == together)
+    material = normalize("NFC", together)  # as it is read from files
+    members = tuple(experiment for experiment in experiments if experiment.material == material)
     if not members:
         materials = ", ".join(sorted({experiment.material for experiment in experiments}))
         raise InputError(f"--together {together}: no such material in {file}; it has {materials}")

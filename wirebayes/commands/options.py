@@ -10,8 +10,8 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.inference.policy import Policy
 from wirebayes.io import gross_events
-from wirebayes.io.experiment import ENOUGH, Experiment, enough, holds_and_readings
-from wirebayes.io.experiment_file import read_experiments, select
+from wirebayes.io.experiment import ENOUGH, Experiment, enough, folder_key, holds_and_readings
+from wirebayes.io.experiment_file import SAME_FOLDER, read_experiments, select
 from wirebayes.model.sample import Likelihood
 from wirebayes.model.spec import ModelSpec
 from wirebayes.strict.files import PathLike
@@ -103,6 +103,8 @@ def _experiments_of(source: Source, name: str | None) -> list[Experiment]:
     if not names or len(set(names)) < len(names):
         found = ", ".join(names) or "nothing"
         raise InputError(f"source: found {found}, expected experiments of different names")
+    if len(set(map(folder_key, names))) < len(names):
+        raise InputError(f"source: found {', '.join(names)}, expected names that differ more: {SAME_FOLDER}")
     return select(experiments, name)
 
 

@@ -17,6 +17,14 @@ from wirebayes.sentences import counted
 from wirebayes.wire.protocol import Control, Protocol
 
 
+def folder_key(name: str) -> str:
+    """What the names of folders that are one folder have in common.
+
+    File systems of Windows and macOS do not tell upper case from lower case, and Windows drops periods at the end.
+    """
+    return name.casefold().rstrip(".")
+
+
 @dataclass(frozen=True, eq=False)
 class Experiment:
     """One test of one wire sample.

@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unicodedata import normalize
 
 from wirebayes.errors import InputError, shown
 from wirebayes.io import mistaken_table
-from wirebayes.io.experiment import ENOUGH, Experiment, enough, holds_and_readings, in_sequence
+from wirebayes.io.experiment import ENOUGH, Experiment, enough, folder_key, holds_and_readings, in_sequence
 from wirebayes.io.readings import READ, SET, STRETCH, Hold, checked_readings, readings_table
 from wirebayes.numeric.frozen import frozen
 from wirebayes.strict.files import read_text
@@ -39,6 +40,7 @@ _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}", re.ASCII)
 _TAKEN = re.compile(
     r"\.{1,2}|\.(lock|computing|checkpoint)|summary\.csv|warnings|.*\.(json|html|svg|partial)", re.IGNORECASE
 )
+SAME_FOLDER = "where upper and lower case are one, both would have the same folder of results"
 SHORTEST = 1e-3  # mm, below any specimen; strains of far shorter ones overflow
 
 
@@ -104,7 +106,7 @@ def read_experiments(path: str | Path) -> list[Experiment]:
 
 
 def refuse_second(keys: Keys, name: str, others: Sequence[str]) -> None:
-    """Refuse a name that another table of the file has.
+    """Refuse a name that another table of the file has, or whose folder of results would be that table's.
 
     Parameters
     ----------
@@ -116,6 +118,10 @@ def refuse_second(keys: Keys, name: str, others: Sequence[str]) -> None:
     """
     if name in others:
         raise keys.complain("name", shown(name) + " a second time", "a name used once in the file")
+    taken = {folder_key(other): other for other in others}
+    if folder_key(name) in taken:
+        found = f"{shown(name)} beside {shown(taken[folder_key(name)])}"
+        raise keys.complain("name", found, f"another name: {SAME_FOLDER}")
 
 
 def length_of(keys: Keys) -> float:
@@ -153,7 +159,8 @@ def experiment_of(keys: Keys, readings: Callable[[], CsvTable]) -> Experiment:
     if _TAKEN.fullmatch(name):
         raise keys.complain("name", shown(name), f"{expected}, and not one that results have for themselves")
     expected = "a name of at most 100 characters without '/', '\\' or control characters"
-    material = keys.string("material", expected)
+    # one spelling of an accent: as two letters it would be another material
+    material = normalize("NFC", keys.string("material", expected))
     if (
         len(material) > 100
         or _TAKEN.fullmatch(material.strip())
