@@ -39,6 +39,7 @@ from wirebayes.progress import Progress, silent
 from wirebayes.robot.history.unknowns import Uncertain
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, typical_spread
+from wirebayes.robot.motion.boundless_creep import refuse_boundless_creep
 from wirebayes.robot.pose.answer import PoseAnswer, pose_report
 from wirebayes.robot.pose.maps import LEVEL, TABLE, Slices, rows
 from wirebayes.robot.pose.orientation import balanced_orientation
@@ -188,6 +189,7 @@ def pose(
     slices = _slices(machine, map_heights, map_rotations)
     other, of_other = given.other(other_fit, machine)
     request = _request(asked, allowed, specimen_spread, slices)
+    refuse_boundless_creep(machine, asked.line, request.position_m, request.rotation, request.times_s[-1])
     options = {
         **at,
         "--times": text_of(times),

@@ -22,6 +22,7 @@ from wirebayes.robot.history.unknowns import Uncertain
 from wirebayes.robot.mechanics import plane
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.motion.boundless_creep import refuse_boundless_creep
 from wirebayes.robot.self_calibration.calibrated import to_dict
 from wirebayes.sentences import short
 from wirebayes.strict.columns import columns_table
@@ -152,6 +153,7 @@ def pose_over_time(asked: AskedPose, option: str, given: Any, errors: Uncertain,
         read = hash_of({option: [cells.header, *cells.rows]})
     _refuse_two_payloads(asked, option, history)
     _refuse_off_plane(robot, option, history)
+    refuse_boundless_creep(robot, asked.line, *asked.start, history.times_s[-1] - history.times_s[0])
     lasting = {  # in a fixed order, as in `wires.configuration`
         "of": name,
         "content": read,
