@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wirebayes.robot.history.doubts import _dynamics
+from wirebayes.robot.history.doubts import _accelerations, _dynamics
 from wirebayes.robot.mechanics.description import GRAVITY
 
 
@@ -23,3 +23,32 @@ def test_the_warning_begins_at_a_twentieth_of_the_weight(share, told):
 def test_lost_poses_and_short_histories_say_nothing():
     assert not _dynamics(np.array([0.0, 1.0]), np.zeros((2, 3)))
     assert not _dynamics(np.arange(4.0), np.full((4, 3), np.nan))
+
+
+def _on(times_s, coordinate_m):
+    """Positions along a line that is no axis."""
+    return np.outer(coordinate_m, [0.6, 0.0, 0.8])
+
+
+def test_a_steady_acceleration_is_found_however_unequal_the_steps():
+    times = np.cumsum(np.random.default_rng(4).uniform(0.1, 2.0, 40))
+    found = _accelerations(times, _on(times, 1.0 + 0.3 * times + 0.5 * 0.7 * times**2))
+    np.testing.assert_allclose(found, 0.7, rtol=1e-9)
+
+
+@pytest.mark.parametrize("rest_s", [1.0, 100.0, 1e4])
+def test_a_long_rest_beside_a_fast_move_hides_nothing(rest_s):
+    """From rest to rest by full acceleration and full braking, and from rest at a steady acceleration."""
+    times = np.array([0.0, rest_s, rest_s + 1.0, 2.0 * rest_s + 1.0])
+    shuttled = _accelerations(times, _on(times, [0.0, 0.0, 1.0, 1.0]))
+    np.testing.assert_allclose(shuttled, 4.0)
+    set_out = _accelerations(times[:3], _on(times[:3], [0.0, 1e-12, 1.0]))
+    np.testing.assert_allclose(set_out, 2.0)
+    braked = _accelerations(times[1:], _on(times[1:], [0.0, 1.0, 1.0]))
+    np.testing.assert_allclose(braked, 2.0)
+
+
+def test_a_move_beside_a_pose_that_was_lost_is_judged_by_its_other_end():
+    times = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
+    found = _accelerations(times, _on(times, [0.0, 0.0, 1.0, np.nan, 1.0]))
+    np.testing.assert_allclose(found[:2], 2.0)

@@ -18,6 +18,7 @@ from wirebayes.sentences import short
 _FEWEST = 50  # effective draws; of so many, what lies beyond a 5 % quantile is 2 to 8 %
 _NAMED = 6  # times in a warning: as many as a line holds
 _INERTIA = 0.05  # of the weight: a force above it changes tensions by as much as the creep that is looked for
+_STILL = 1e-2  # of the speed of a move: a platform that is so slow beside it stands still
 _MISFIT = 2.0  # mean squared residual from which on the readings contradict the model
 
 
@@ -154,7 +155,6 @@ def _dynamics(times_s: Floats, position_m: Floats) -> list[Notice]:
     ----------
     times_s : (t,) array
     position_m : (t, 3) array
-        Between two rows the motion is taken to be even.
     """
     if len(times_s) < 3:
         return []
@@ -165,14 +165,23 @@ def _dynamics(times_s: Floats, position_m: Floats) -> list[Notice]:
         return []
     text = (
         f"the platform's inertia is left out: at {times_s[k + 1]:.10g} s it takes {short(100 * share[k], 2)} % of "
-        "its weight to accelerate it, so tensions and poses are those of a slower motion along the same way"
+        "its weight or more to accelerate it, so tensions and poses are those of a slower motion along the same way"
     )
     return [Notice("left-out", text)]
 
 
 def _accelerations(times_s: Floats, position_m: Floats) -> Floats:
-    """(t - 2,) m/s² at the rows between the first and the last."""
+    """(t - 2,) m/s² at the rows between the first and the last: the least that leads through the poses in time.
+
+    Three rows alone say no more than their second difference, which is exact for a steady acceleration however unequal
+    the steps. A platform that stands still before or after a move gains or loses the move's speed within the move.
+    """
     step = np.diff(times_s)
-    speed = np.diff(position_m, axis=0) / step[:, None]
-    change = np.linalg.norm(np.diff(speed, axis=0), axis=1)
-    return change / (0.5 * (step[1:] + step[:-1]))
+    velocity = np.diff(position_m, axis=0) / step[:, None]
+    change = np.linalg.norm(np.diff(velocity, axis=0), axis=1)
+    through = change / (0.5 * (step[1:] + step[:-1]))
+    speed = np.linalg.norm(velocity, axis=1)
+    still = np.r_[False, speed[:-1] <= _STILL * speed[1:]], np.r_[speed[1:] <= _STILL * speed[:-1], False]
+    ends_at_rest = still[0].astype(int) + still[1].astype(int)
+    within = 2.0 * ends_at_rest * speed / step  # from rest to rest: to twice the mean speed in half the time
+    return np.fmax(through, np.fmax(within[:-1], within[1:]))
