@@ -12,6 +12,7 @@ import numpy as np
 from wirebayes.errors import InputError, shown
 from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.robot.mechanics.description import Drums, Freedom, GivenWire, Plane, Pulleys, Robot, TensionRule
+from wirebayes.robot.mechanics.free_turning import turns_freely
 from wirebayes.robot.mechanics.shipped import shipped as shipped
 from wirebayes.robot.mechanics.tensions import CHOICES
 from wirebayes.sentences import short
@@ -110,7 +111,7 @@ def _robot(top: Keys) -> Robot:
     def stack(key: str) -> Any:
         return np.array([leg[key] for leg in legs])
 
-    return Robot(
+    robot = Robot(
         name=name,
         description=description,
         source=source,
@@ -140,6 +141,17 @@ def _robot(top: Keys) -> Robot:
         joint_offset_m=_or_none(stack("joint_offset")),
         home_rotation_is_stated=home.rotation_is_stated,
     )
+    _check_turning(top, robot)
+    return robot
+
+
+def _check_turning(top: Keys, robot: Robot) -> None:
+    """A platform whose turn nothing decides hangs in no stable balance, wherever it is."""
+    about = turns_freely(robot)
+    if about:
+        instead = 'points that hold its turn, or freedom = "position", which asks for its position alone'
+        found = f"{shown(robot.freedom)} and a platform that turns freely about {about}"
+        raise top.complain("freedom", found, "points that hold it" if robot.freedom == "orientation" else instead)
 
 
 def _check_ball_joint(top: Keys, plane: Plane | None, corners_m: Floats, legs: int) -> None:
