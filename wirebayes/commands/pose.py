@@ -189,7 +189,6 @@ def pose(
     slices = _slices(machine, map_heights, map_rotations)
     other, of_other = given.other(other_fit, machine)
     request = _request(asked, allowed, specimen_spread, slices)
-    refuse_boundless_creep(machine, asked.line, request.position_m, request.rotation, request.times_s[-1])
     options = {
         **at,
         "--times": text_of(times),
@@ -276,6 +275,7 @@ class _Allowed:
 def _request(asked: AskedPose, allowed: _Allowed, specimen_spread: float, slices: Slices) -> PoseRequest:
     """The pose that is asked for, balance deciding what was left free."""
     there = balanced_orientation(asked.robot, asked.position_m, asked.rotation_rad)
+    refuse_boundless_creep(asked.robot, asked.line, there.position_m, there.rotation, allowed.times_s[-1])
     return PoseRequest(
         there.position_m,
         there.rotation,
