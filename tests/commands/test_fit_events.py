@@ -49,5 +49,5 @@ def test_experiments_whose_folders_would_be_one_somewhere_are_refused(pair: list
 
 def test_a_material_is_found_however_its_accents_are_written(pair: list[Experiment]) -> None:
     cable = [replace(test, material="c\u00e2ble") for test in pair]
-    with pytest.raises(wb.InputError, match="effect toe@1"):  # the material is there, the effect is of no hold
-        wb.fit(cable, together="ca\u0302ble", effects=["toe@1"], check=False, policy=FEW)
+    with pytest.raises(wb.InputError, match="found no recorded hold 6 in first, second of"):
+        wb.fit(cable, together="ca\u0302ble", effects=["grip_slip@6"], check=False, policy=FEW)
