@@ -34,7 +34,7 @@ SLIP = {
     "p_simulations": 999,
     "held_out": HELD_OUT,
     "next_measurement": "Unload.",
-    "amplitudes": {"grip_slip": {"mean": 0.31, "q05": 0.25, "q95": 0.38, "unit": "mm", "hold": 4}},
+    "amplitudes": {"grip_slip": {"mean": 0.7, "q05": 0.25, "q50": 0.31, "q95": 0.38, "unit": "mm", "hold": 4}},
 }
 CLEAN = {
     "verdict": "nothing-missing",

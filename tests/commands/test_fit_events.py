@@ -6,6 +6,7 @@ import pytest
 
 import wirebayes as wb
 from tests.simulated import WIRE, simulated_tests
+from wirebayes.effects import effect_named
 from wirebayes.io.experiment import Experiment
 from wirebayes.simulation.synthetic import Bench, Truth
 
@@ -26,6 +27,21 @@ def test_an_event_may_name_its_test(pair: list[Experiment]) -> None:
     assert found.summary()["effects"] == ["grip_slip@second:5"]
     effects = {name: found.stored(name).sample.model.effects for name in ("first", "second")}
     assert effects["first"] == () and [e.key for e in effects["second"]] == ["grip_slip@second:5"]
+
+
+def test_the_readings_say_how_long_a_pause_was_not_its_prior() -> None:
+    """Seventeen holds long: a prior of some holds without a tail answered 1,400 s, and said that it decides."""
+    times = (0.0, 10.0, 20.0, 40.0, 60.0, 90.0, 120.0)
+    bench = Bench("pause", "line", displacements_mm=tuple(range(1, 11)), times_s=times)
+    wire = {"k1": 900.0, "B": 0.5, "U": 0.8, "k2": 0.01, "N": 0.75, "preload": 0.3}
+    errors = {"sensor_sd": 0.004, "setting_sd": 0.01}
+    effect = effect_named("unrecorded_hold@6")
+    pause = {"unrecorded_hold.T": 2000.0}
+    tests = simulated_tests([bench], Truth(wire | errors | pause, effects=[effect]), seed=1)
+    summary = wb.fit(tests, effects=[effect.key], check=False, policy=FEW).summary()
+    found = summary["parameters"]["unrecorded_hold.T"]
+    assert found["q05"] < 2000.0 < found["q95"]
+    assert "prior" not in [notice["kind"] for notice in summary["warnings"]]
 
 
 @pytest.mark.parametrize(

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from wirebayes.numeric.distributions import Distribution, LogitNormal, log_density_of, ours, scaled
+from wirebayes.numeric.distributions import Distribution, LogitNormal, finite_spread, log_density_of, ours, scaled
 
 KNOWN = {
     "Normal": stats.norm(0.5, 2.0),
     "HalfNormal": stats.halfnorm(0.1, 0.3),
+    "HalfCauchy": stats.halfcauchy(0.0, 2.5),
     "LogNormal": stats.lognorm(1.2, scale=0.03),
     "Uniform": stats.uniform(-1.0, 3.0),
     "LogUniform": stats.loguniform(0.3, 6.0),
@@ -66,9 +67,16 @@ def test_a_share_whose_logit_is_normal():
     assert (of.mean(), of.std()) == pytest.approx((mean, np.sqrt(square - mean**2)), rel=1e-8)
 
 
-@pytest.mark.parametrize("other", [stats.beta(1.0, 30.0), stats.lognorm(0.5, loc=1.0, scale=2.0), stats.halfcauchy()])
+@pytest.mark.parametrize("other", [stats.beta(1.0, 30.0), stats.lognorm(0.5, loc=1.0, scale=2.0), stats.halflogistic()])
 def test_any_other_distribution_of_scipy_serves_as_it_is(other):
     assert ours(other) is other and not isinstance(other, Distribution)
     x = np.array([0.01, 0.3, 1.4, 9.0])
     assert log_density_of(other)(x) == pytest.approx(other.logpdf(x), rel=1e-15)
     assert scaled(other, 3.0).ppf(SHARES[1:-1]) == pytest.approx(3.0 * other.ppf(SHARES[1:-1]), rel=1e-12)
+
+
+def test_a_spread_is_finite_where_the_standard_deviation_is_not():
+    assert finite_spread(stats.norm(3.0, 2.0)) == pytest.approx(2.0)
+    within = stats.halfcauchy(scale=2.5)
+    low, high = within.ppf(stats.norm.cdf([-1.0, 1.0]))
+    assert finite_spread(within) == pytest.approx(0.5 * (high - low))

@@ -7,7 +7,13 @@ import numpy as np
 from wirebayes.answers.creep import creep_as_long_as_held, lengths_in_words
 from wirebayes.answers.robot import stays_in_words
 from wirebayes.answers.terminal import MOST_OUTLIERS, missing_in
-from wirebayes.answers.verdict import control_judged, is_more_than_chance, verdict_in_words, what_it_is
+from wirebayes.answers.verdict import (
+    control_judged,
+    is_more_than_chance,
+    median_between,
+    verdict_in_words,
+    what_it_is,
+)
 from wirebayes.json_files.batch import BatchJson, Row
 from wirebayes.json_files.calibrate import CalibrateJson
 from wirebayes.json_files.check import CheckedExperiment
@@ -116,7 +122,7 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
     several = len(effects) > 1
     sizes = {}
     for effect, size in report["amplitudes"].items():
-        sizes[spoken(effect)] = quantity(size["mean"], size["q05"], size["q95"], size["unit"])
+        sizes[spoken(effect)] = quantity(*median_between(size), size["unit"])
     what = _missing(report, effects)
     with_it = "with them" if several else "with it"
     if verdict == "ambiguous":  # then the model has the most likely of several

@@ -4,7 +4,13 @@ from collections.abc import Sequence
 from typing import Literal
 
 from wirebayes.answers.creep import creep_as_long_as_held, lengths_in_words
-from wirebayes.answers.verdict import control_judged, lead_may_be_chance, verdict_in_words, what_it_is
+from wirebayes.answers.verdict import (
+    control_judged,
+    lead_may_be_chance,
+    median_between,
+    verdict_in_words,
+    what_it_is,
+)
 from wirebayes.json_files.batch import BatchJson, Row
 from wirebayes.json_files.check import CheckedExperiment, EffectSize, HoldUnderstood, ParameterRange
 from wirebayes.json_files.comparison import ComparedModel, ComparedModels
@@ -102,7 +108,7 @@ def _verdict(report: ExperimentFindings) -> str:
 def _effect_size(effect: str, size: AmplitudeEstimate, control: Control) -> str:
     """How large an effect is, and what it is."""
     hold = "" if size["hold"] is None else f" at hold {size['hold']}"
-    middle, low, high = (short(size[name], 3) for name in ("mean", "q05", "q95"))
+    middle, low, high = (short(value, 3) for value in median_between(size))
     return f"{spoken(effect)}{hold} {middle} [{low}, {high}]{_unit_and_meaning(effect, size['unit'], control)}"
 
 

@@ -2,7 +2,7 @@
 
 from wirebayes.effects import CATALOGUE
 from wirebayes.json_files.comparison import ComparedModels, Difference
-from wirebayes.json_files.discovery import ExperimentFindings
+from wirebayes.json_files.discovery import AmplitudeEstimate, ExperimentFindings
 from wirebayes.json_files.read_units import unit_read
 from wirebayes.sentences import likely
 from wirebayes.wire.protocol import Control
@@ -29,6 +29,14 @@ def verdict_in_words(report: ExperimentFindings) -> str | None:
 def control_judged(report: ExperimentFindings) -> Control:
     """What was set in an experiment that was searched: what is read in mm is read under weights."""
     return "force" if unit_read(report["held_out"]["plain"]) == "mm" else "displacement"
+
+
+def median_between(size: AmplitudeEstimate) -> tuple[float, float, float]:
+    """The median of an effect's size, and the ends of its interval; the mean where an older file has no median.
+
+    A size whose upper end the readings leave open has a mean far from where it probably lies.
+    """
+    return size.get("q50", size["mean"]), size["q05"], size["q95"]
 
 
 def what_it_is(effect: str, control: Control = "displacement") -> str:

@@ -306,6 +306,7 @@ def _posterior_amplitudes(found: Investigation, output: Path) -> None:
             of_posterior = parameters[column]
             amplitude["mean"] = of_posterior["mean"]
             amplitude["q05"] = of_posterior["q05"]
+            amplitude["q50"] = of_posterior["q50"]
             amplitude["q95"] = of_posterior["q95"]
 
 

@@ -12,6 +12,7 @@ from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.settings import Settings
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.json_files.discovery import DetectableAmplitude, Outlook
+from wirebayes.numeric.distributions import finite_spread
 from wirebayes.wire.effect import Effect
 
 
@@ -75,7 +76,7 @@ def _best_hidden(found: Mapping[str, tuple[int, float | None]], trials: Sequence
 
     def hiddenness(name: str) -> float:
         probe, amplitude = found[name]
-        return np.inf if amplitude is None else amplitude / float(trials[probe].effect.amplitudes[0].prior.std())
+        return np.inf if amplitude is None else amplitude / finite_spread(trials[probe].effect.amplitudes[0].prior)
 
     return trials[found[max(found, key=hiddenness)][0]] if found else None
 

@@ -19,6 +19,7 @@ from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.model.problem import Problem
 from wirebayes.model.scales import NATURAL
 from wirebayes.model.spec import PLAIN_SPEC
+from wirebayes.numeric.distributions import finite_spread
 from wirebayes.numeric.typing import Array
 from wirebayes.result_warnings import Notice
 from wirebayes.results import hold_ends
@@ -143,7 +144,7 @@ def _shown(block: LaplaceFit, effect: Effect, amplitude: float | None) -> Effect
     if amplitude is None:
         return _hidden(type(effect), "taken up by the model's own parameters", block.experiments[0].control)
     main = effect.amplitudes[0]
-    shows = "yes" if amplitude <= UNUSUAL * float(main.prior.std()) else "if unusually large"
+    shows = "yes" if amplitude <= UNUSUAL * finite_spread(main.prior) else "if unusually large"
     seen = block.natural_amplitude(effect, amplitude)
     return {"shows": shows, "amplitude_80": seen, "unit": block.unit(effect), "reason": None}
 

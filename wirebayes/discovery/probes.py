@@ -7,6 +7,7 @@ import numpy as np
 
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model.sample import Sample
+from wirebayes.numeric.distributions import finite_spread
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.model import Model
@@ -40,7 +41,7 @@ def probes(effect: Effect) -> list[Probe]:
     amplitude = effect.amplitudes[0]
     neutral = amplitude.neutral
     low, high = amplitude.prior.support()
-    scale = float(amplitude.prior.std())
+    scale = finite_spread(amplitude.prior)
     one_sided = bool(low >= neutral)
     steps = [0.1 * scale]
     if one_sided and not effect.nearly_linear:

@@ -16,6 +16,7 @@ from wirebayes.discovery.profile import Profile, has_near_neighbours, integral_o
 from wirebayes.discovery.sharing import alike
 from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
 from wirebayes.inference.optimum import Optimum
+from wirebayes.numeric.distributions import finite_spread
 from wirebayes.numeric.typing import Array, Function, Ints
 from wirebayes.wire.effect import Effect
 
@@ -144,7 +145,7 @@ class _Amplitude:
         low, high = max(least, main.neutral - reach), min(most, main.neutral + reach)
         pinned = [Pinned(block, effect) for block in blocks]
         prior = pinned[0].prior
-        unit = min(per_delta, _LARGEST_UNIT * float(prior.std()))
+        unit = min(per_delta, _LARGEST_UNIT * finite_spread(prior))
         log_prior = within(prior, main.neutral, reach)
         without = sum(block.log_evidence for block in blocks)
         return cls(pinned, main.neutral, low, high, unit, lambda amplitudes: log_prior(amplitudes) - without)

@@ -220,9 +220,9 @@ def _family(family: FamilyEvidence) -> FamilyReport:
 
 def _amplitude(final: LaplaceFit, effect: Effect) -> AmplitudeEstimate:
     """Amplitude in the final model, by its normal approximation in the sampled coordinates."""
-    low, mean, high = map(float, final.along(effect, (-1.645, 0.0, 1.645)))
+    low, middle, high = map(float, final.along(effect, (-1.645, 0.0, 1.645)))
     hold = effect.hold if isinstance(effect, EventEffect) else None
-    return {"mean": mean, "q05": low, "q95": high, "unit": final.unit(effect), "hold": hold}
+    return {"mean": middle, "q05": low, "q50": middle, "q95": high, "unit": final.unit(effect), "hold": hold}
 
 
 def _inclusion(found: Evidence | None) -> dict[str, float]:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from wirebayes.numeric.distributions import HalfNormal, Normal
+from wirebayes.numeric.distributions import HalfCauchy, Normal
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Amplitude, EventEffect, HoldContext, Own
 
@@ -32,8 +32,8 @@ class UnrecordedHold(EventEffect):
     pattern = "step at a hold"
     place = "wait"
     formula = "wait"
-    # some holds long: from a pause between two holds to a break at noon in a test of minutes
-    amplitudes = (Amplitude("T", "s", 0.0, HalfNormal(2.5)),)
+    # some holds long, as a pause between two holds is; the tail is for a night in a test of minutes, hundreds of holds
+    amplitudes = (Amplitude("T", "s", 0.0, HalfCauchy(2.5)),)
     sentence = "Time passed at a displacement before its first reading."
     sentence_of_weights = "Time passed under a weight before its first reading."
     shows = "step in level; names the hold"

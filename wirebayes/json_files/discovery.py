@@ -8,10 +8,11 @@ Verdict = Literal["nothing-missing", "named", "ambiguous", "partial", "unknown"]
 
 
 class AmplitudeEstimate(TypedDict):
-    """The amplitude of an accepted effect; `hold` is that of an event."""
+    """The amplitude of an accepted effect; `hold` is that of an event. Files of earlier versions have no median."""
 
     mean: float
     q05: float
+    q50: NotRequired[float]
     q95: float
     unit: str
     hold: int | None

@@ -15,6 +15,7 @@ from scipy.special import expit, log_ndtr, logit, ndtr, ndtri, ndtri_exp
 from wirebayes.numeric.typing import Array, Function
 
 _HALF_LOG_2PI = 0.5 * float(np.log(2.0 * np.pi))
+ONE_SD = np.array([0.15865525393145707, 0.8413447460685429])  # shares of a normal below -1 and 1
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(64)  # of means over a standard normal number
 
 
@@ -129,6 +130,37 @@ class HalfNormal(Distribution):
 
     def scaled(self, factor: float) -> "HalfNormal":
         return HalfNormal(self.sd * factor, self.least * factor)
+
+
+@dataclass(frozen=True)
+class HalfCauchy(Distribution):
+    """The upper half of a Cauchy distribution about zero: half lies below `scale`, and a tail reaches far beyond."""
+
+    scale: float
+
+    def log_density(self) -> Function:
+        scale = self.scale
+        constant = float(np.log(2.0 / np.pi)) - float(np.log(scale))
+        return lambda x: np.where(x >= 0.0, constant - np.log1p((x / scale) ** 2), -np.inf)
+
+    def cdf(self, x: Any) -> Any:
+        return 2.0 / np.pi * np.arctan(np.maximum(x, 0.0) / self.scale)
+
+    def ppf(self, q: Any) -> Any:
+        q = np.asarray(q, float)
+        return np.where(q < 1.0, np.tan(0.5 * np.pi * q) * self.scale, np.inf)
+
+    def support(self) -> tuple[float, float]:
+        return 0.0, np.inf
+
+    def mean(self) -> float:
+        return np.inf
+
+    def std(self) -> float:
+        return np.inf
+
+    def scaled(self, factor: float) -> "HalfCauchy":
+        return HalfCauchy(self.scale * factor)
 
 
 @dataclass(frozen=True)
@@ -323,6 +355,8 @@ def ours(distribution: Any) -> Any:
             return Normal(loc, scale)
         case "halfnorm":
             return HalfNormal(scale, loc)
+        case "halfcauchy" if loc == 0.0:
+            return HalfCauchy(scale)
         case "truncnorm" if shapes[1] == np.inf:
             return TruncatedNormal(shapes[0], loc, scale)
         case "lognorm" if loc == 0.0:
@@ -344,6 +378,15 @@ def scaled(distribution: Any, factor: float) -> Any:
     other = copy(known)
     other.args, other.kwds = shapes, {"loc": loc * factor, "scale": scale * factor}
     return other
+
+
+def finite_spread(distribution: Any) -> float:
+    """Its standard deviation; where that is infinite, half the distance between its 16 % and 84 % quantiles."""
+    sd = float(distribution.std())
+    if np.isfinite(sd):
+        return sd
+    low, high = distribution.ppf(ONE_SD)
+    return float(0.5 * (high - low))
 
 
 def log_density_of(distribution: Any) -> Function:

@@ -18,6 +18,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.plan import EffectPower
 from wirebayes.model.build import build
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
+from wirebayes.numeric.distributions import finite_spread
 from wirebayes.planning.widths import Guess, central
 from wirebayes.wire.effect import Effect, Kinds
 
@@ -92,7 +93,7 @@ def _power(block: LaplaceFit, effect: Effect, seen: float | None, strength: floa
         "amplitude_80": None if seen is None else block.natural_amplitude(effect, seen),
         "unit": block.unit(effect),
         "delta_80": None if seen is None else seen * strength,
-        "delta_prior": float(strength * prior.std()),
+        "delta_prior": strength * finite_spread(prior),
         "confused_with": [],
     }
 

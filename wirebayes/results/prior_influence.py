@@ -8,7 +8,7 @@ import numpy as np
 
 from wirebayes.model.prior import Prior
 from wirebayes.model.sample import NOISES, SAMPLE
-from wirebayes.numeric.distributions import HalfNormal, LogitNormal, LogNormal, Normal, log_density_of, ours
+from wirebayes.numeric.distributions import HalfCauchy, HalfNormal, LogitNormal, LogNormal, Normal, log_density_of, ours
 from wirebayes.numeric.typing import Array
 from wirebayes.result_warnings import Notice
 from wirebayes.results.parameters import parameter_of
@@ -97,6 +97,8 @@ def _wider(distribution: Any) -> Any:
             return replace(known, sd_log=WIDER * known.sd_log)
         case Normal() | HalfNormal() | LogitNormal() as known:
             return replace(known, sd=WIDER * known.sd)
+        case HalfCauchy() as known:
+            return replace(known, scale=WIDER * known.scale)
     return None
 
 

@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import Any, ClassVar, Literal
 
 from wirebayes.answers import terminal
+from wirebayes.answers.verdict import median_between
 from wirebayes.errors import InputError
 from wirebayes.json_files.discovery import DiscoveryJson, ExperimentFindings
 from wirebayes.sentences import p_in_words, quantity, spoken
@@ -102,4 +103,4 @@ class Findings(PlainAndFinal[DiscoveryJson]):
 def _sizes(found: ExperimentFindings) -> str:
     """The effects with their sizes."""
     sizes = found["amplitudes"].items()
-    return ", ".join(f"{spoken(e)} {quantity(a['mean'], a['q05'], a['q95'], a['unit'])}" for e, a in sizes)
+    return ", ".join(f"{spoken(e)} {quantity(*median_between(a), a['unit'])}" for e, a in sizes)

@@ -8,6 +8,7 @@ from wirebayes.inference.coordinates.edges import edge
 
 ENDED = [
     stats.halfnorm(0.0, 2.0),
+    stats.halfcauchy(0.0, 2.5),
     stats.uniform(-1.0, 4.0),
     stats.truncnorm(-1.0, np.inf, loc=0.01, scale=0.01),
     stats.truncnorm(0.0, np.inf, loc=0.0, scale=3.0),

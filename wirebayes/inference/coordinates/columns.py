@@ -8,10 +8,8 @@ import numpy as np
 
 from wirebayes.inference.coordinates.edges import Edge, edge
 from wirebayes.model.problem import Problem
-from wirebayes.numeric.distributions import LogitNormal
+from wirebayes.numeric.distributions import ONE_SD, LogitNormal, finite_spread
 from wirebayes.numeric.typing import Array, Bools, Ints
-
-ONE_SD = np.array([0.15865525393145707, 0.8413447460685429])  # shares of a normal below -1 and 1
 
 
 @dataclass(frozen=True)
@@ -131,8 +129,8 @@ def _log_odds(value: Any, most: Any) -> Any:
 
 
 def _spread(distribution: Any) -> float:
-    sd = float(distribution.std())
-    return sd if np.isfinite(sd) and sd > 0 else 1.0
+    spread = finite_spread(distribution)
+    return spread if np.isfinite(spread) and spread > 0 else 1.0
 
 
 def _log_spread(distribution: Any, most: float) -> float:

@@ -6,7 +6,15 @@ from typing import Any
 import numpy as np
 from scipy.special import erf, erfc, erfcinv, erfinv, ndtr, ndtri
 
-from wirebayes.numeric.distributions import HalfNormal, LogUniform, Normal, TruncatedNormal, Uniform, ours
+from wirebayes.numeric.distributions import (
+    HalfCauchy,
+    HalfNormal,
+    LogUniform,
+    Normal,
+    TruncatedNormal,
+    Uniform,
+    ours,
+)
 from wirebayes.numeric.typing import Array, Function
 
 _NEAREST = 1e-9  # share of the prior between an edge and a value on it, whose score would be infinite
@@ -35,10 +43,12 @@ class Edge:
 
 
 def edge(distribution: Any) -> Edge | None:
-    """The map for a half-normal at zero, a normal one cut off below, and (log-)uniform ones; none for others."""
+    """The map for halves of a normal and a Cauchy one, a normal cut off below, (log-)uniform ones; none for others."""
     match ours(distribution):
         case HalfNormal(sd, 0.0) as known:
             return _half_normal(sd, known.log_density())
+        case HalfCauchy(scale) as known:
+            return _half_cauchy(scale, known.log_density())
         case TruncatedNormal() as known:
             return _cut_off(known)
         case Uniform(low, width) as known:
@@ -63,6 +73,24 @@ def _half_normal(sd: float, log_prior: Function) -> Edge:
         above = ndtr(-np.maximum(score, 0.0))
         u = np.where(score < 0.0, erfinv(below), erfcinv(above))
         return unit * u
+
+    return Edge(score, value, log_prior, False)
+
+
+def _half_cauchy(scale: float, log_prior: Function) -> Edge:
+    """Each half from its own tail, where it keeps its digits."""
+
+    def score(value: Array) -> Array:
+        u = value / scale
+        below = np.maximum(2.0 / np.pi * np.arctan(u), _NEAREST)
+        above = 2.0 / np.pi * np.arctan(1.0 / np.maximum(u, 1.0))
+        return np.where(u < 1.0, ndtri(below), -ndtri(above))
+
+    def value(score: Array) -> Array:
+        below = ndtr(np.minimum(score, 0.0))
+        above = ndtr(-np.maximum(score, 0.0))
+        u = np.where(score < 0.0, np.tan(0.5 * np.pi * below), 1.0 / np.tan(0.5 * np.pi * above))
+        return scale * u
 
     return Edge(score, value, log_prior, False)
 

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.inference.coordinates.columns import ONE_SD, ColumnMap
+from wirebayes.inference.coordinates.columns import ColumnMap
 from wirebayes.inference.coordinates.power_of_tension import suiting_powers
 from wirebayes.inference.coordinates.ridge import Ridge
 from wirebayes.inference.coordinates.shares import Elongation
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import MATERIAL, Sample
+from wirebayes.numeric.distributions import ONE_SD
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect, HoldContext
 

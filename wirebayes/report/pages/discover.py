@@ -5,6 +5,7 @@ from pathlib import Path
 
 from wirebayes.answers.headline import USE, findings_in_a_sentence
 from wirebayes.answers.terminal import in_other_tests
+from wirebayes.answers.verdict import median_between
 from wirebayes.effects.unknown import Discrepancy
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.discovery import AmplitudeEstimate, DiscoveryJson, ExperimentFindings
@@ -314,6 +315,6 @@ def _sizes(v: ExperimentFindings) -> list[str]:
 
 
 def _amplitude(effect: str, amplitude: AmplitudeEstimate) -> str:
-    size = quantity(amplitude["mean"], amplitude["q05"], amplitude["q95"], amplitude["unit"])
+    size = quantity(*median_between(amplitude), amplitude["unit"])
     since = "" if amplitude.get("hold") is None else f", from hold {amplitude['hold']} on"
     return f"{spoken(effect)}: {size}{since}."
