@@ -16,8 +16,10 @@ from wirebayes.discovery.families import (
     grouped,
     refitted_probe,
 )
+from wirebayes.discovery.judgement import Evidence, FamilyEvidence
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.name_evidence import weigh_names
+from wirebayes.discovery.search import _families
 from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.model.spec import PLAIN_SPEC
@@ -48,6 +50,20 @@ def test_a_family_is_called_by_what_its_members_have_in_common() -> None:
     assert called(("toe", "strain_stiffening")) == "elastic curve" and called(("toe",)) == "toe"
     assert called(("screw_wobble", "toe")) == "screw_wobble"  # a user's own effect has no other name
     assert {n for n, kind in CATALOGUE.items() if kind.pattern not in PATTERNS} == set(), "an effect needs a pattern"
+
+
+def test_families_with_the_same_in_common_have_names_and_sentences_of_their_own() -> None:
+    members = [
+        {"prior_creep": 0.7, "unrecorded_hold": 0.3},
+        {"toe": 0.6, "power_strain": 0.4},
+        {"creep_threshold": 0.8, "ageing": 0.2},
+    ]
+    families = tuple(FamilyEvidence(each, inclusion=0.95, gain=5.0) for each in members)
+    found = _families(Evidence(0.001, 0.0, families, {}, None, 0.1, None))
+    names = ["creep from hold to hold: prior creep", "elastic curve", "creep from hold to hold: creep threshold"]
+    assert [family["name"] for family in found] == names
+    assert found[0]["sentence"].startswith("the creep changes from hold to hold: prior creep 70 %")
+    assert found[2]["sentence"].startswith("the creep changes from hold to hold, in another way: creep threshold 80 %")
 
 
 def test_a_family_is_said_as_a_person_who_tests_lines_would() -> None:

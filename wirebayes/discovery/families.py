@@ -134,7 +134,17 @@ def called(family: Family) -> str:
     return pattern if pattern and len(family) > 1 else best
 
 
-def family_sentence(members: Mapping[str, float]) -> str:
+def family_names(families: Sequence[Family]) -> list[str]:
+    """A name for each of the families found in one test: as `called`, with the best member where two have that name."""
+    names = [called(family) for family in families]
+    out = []
+    for name, family in zip(names, families, strict=True):
+        is_shared = names.count(name) > 1
+        out.append(f"{name}: {family[0].replace('_', ' ')}" if is_shared else name)
+    return out
+
+
+def family_sentence(members: Mapping[str, float], *, again: bool = False) -> str:
     """What a family says of the wire, and the probability of each of its members to be what is missing.
 
     Those below one in a hundred are left out; one that is all but certain is named without its probability.
@@ -143,9 +153,13 @@ def family_sentence(members: Mapping[str, float]) -> str:
     ----------
     members : mapping of name to float
         The most probable first.
+    again : bool
+        Whether a family before it has the same in common: signatures of one pattern may still differ.
     """
     label = called(tuple(members))
     pattern = PATTERNS.get(label, f"there is {label.replace('_', ' ')}")
+    if again:
+        pattern += ", in another way"
     shares = {name.replace("_", " "): p for name, p in members.items() if p >= _WORTH_SAYING}
     said = [name if p > _CERTAIN else f"{name} {100 * p:.0f} %" for name, p in shares.items()]
     return f"{pattern}: {', '.join(said)}" if said else pattern

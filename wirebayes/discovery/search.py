@@ -15,7 +15,7 @@ from numpy.random import Generator
 
 from wirebayes.discovery import gross_errors, power, residual_patterns, shrinking
 from wirebayes.discovery.alternatives import Alternative, alternatives
-from wirebayes.discovery.families import block_ratio, called, family_sentence
+from wirebayes.discovery.families import block_ratio, called, family_names, family_sentence
 from wirebayes.discovery.global_test import Gate, examine
 from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.investigation import Concluded, Investigation
@@ -205,16 +205,29 @@ def _few_holds(e: Experiment) -> list[Notice]:
     return [Notice("few-holds", text)]
 
 
-def _family(family: FamilyEvidence) -> FamilyReport:
-    """What is said of a family."""
-    members = tuple(family.members)
+def _families(found: Evidence | None) -> list[FamilyReport]:
+    """What is said of each family."""
+    families = () if found is None else found.families
+    names = family_names([tuple(family.members) for family in families])
+    established = set[str]()
+    out = []
+    for name, family in zip(names, families, strict=True):
+        pattern = called(tuple(family.members))
+        out.append(_family(name, family, again=pattern in established))
+        if family.is_established:
+            established.add(pattern)
+    return out
+
+
+def _family(name: str, family: FamilyEvidence, *, again: bool) -> FamilyReport:
+    """What is said of a family, which is one of a pattern once more or not."""
     return {
-        "name": called(members),
-        "members": list(members),
+        "name": name,
+        "members": list(family.members),
         "inclusion": family.inclusion,
         "leave_one_hold_out": family.gain,
         "established": family.is_established,
-        "sentence": family_sentence(family.members),
+        "sentence": family_sentence(family.members, again=again),
     }
 
 
@@ -254,7 +267,7 @@ def _common(
         "probabilities": answer.shares,
         "probability_nothing": None if answer.found is None else answer.found.nothing,
         "inclusion": _inclusion(answer.found),
-        "families": [] if answer.found is None else [_family(f) for f in answer.found.families],
+        "families": _families(answer.found),
         "parameters": {},
         "remainder": answer.remainder,
         "p_global": test.p,
