@@ -8,7 +8,7 @@ import pytest
 import wirebayes as wb
 from wirebayes.inference.policy import Policy
 from wirebayes.io.checked_test import CheckedTest
-from wirebayes.io.data_checks import LEAST_DIFFERENT, copied_tests
+from wirebayes.io.data_checks import COPIED_TEST, copied_tests
 from wirebayes.io.experiment import Experiment
 
 FEW = Policy(walkers=32, ess=300, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
@@ -42,11 +42,11 @@ def test_other_readings_of_the_same_settings_are_no_copy(twice: list[Experiment]
     assert not _copied([twice[0], replace(other, name="other")])
 
 
-@pytest.mark.parametrize("readings", [LEAST_DIFFERENT - 1, LEAST_DIFFERENT])
+@pytest.mark.parametrize("readings", [COPIED_TEST - 1, COPIED_TEST])
 def test_few_readings_may_agree_by_chance(twice: list[Experiment], readings: int) -> None:
     short = []
     for test in twice:
         hold = test.holds[0]
         begun = replace(hold, time_s=hold.time_s[:readings], readings=hold.readings[:readings])
         short.append(replace(test, holds=(begun,)))
-    assert bool(_copied(short)) == (readings >= LEAST_DIFFERENT)
+    assert bool(_copied(short)) == (readings >= COPIED_TEST)

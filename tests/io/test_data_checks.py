@@ -159,6 +159,17 @@ def test_threads_and_ropes_get_no_warning(sound):
         assert warning(protocol, scale * tension, scale * 0.01) == ""
 
 
+@pytest.mark.parametrize("different", [data_checks.COPIED_HOLD - 1, data_checks.COPIED_HOLD])
+def test_a_copied_hold_is_told_by_few_different_readings(sound, different):
+    protocol, tension = sound
+    copied = tension.copy()
+    copied[6] = copied[6, 0]
+    copied[6, :different] += 0.01 * np.arange(different)
+    copied[7] = copied[6]
+    said = "holds 7 and 8 have the same 5 readings at two displacements" in warning(protocol, copied)
+    assert said == (different == data_checks.COPIED_HOLD)
+
+
 def test_the_same_place_throughout(sound):
     protocol, tension = sound
     still = replace(protocol, setting=np.ones_like(protocol.setting))

@@ -30,8 +30,9 @@ RISING_HOLDS, RISING_SHARE, RISE = 5, 0.8, 2.0  # holds on loading, share that r
 SHRINKING_HOLDS = 4  # no wire shrinks under a load: fewer are enough, if all of them do
 JUMP, JUMP_STAYS = 2.0, 0.2  # times the changes before and after it; share of it that is left to the hold's end
 FASTER = 5.0  # times the speed of the changes before and after it, which neither creep gains and loses nor a misprint
-COPIED = 3  # different readings that agree one by one at two displacements: not by chance
-LEAST_DIFFERENT = 4  # different readings that agree one by one in two tests: not by chance
+# Different readings that agree one by one, and not by chance: in two holds of a test, whose levels a step keeps apart;
+# and in two tests of the same settings, whose levels agree as well, so that coarse readings of few values may, too.
+COPIED_HOLD, COPIED_TEST = 3, 4
 OFF_GRID = 0.5  # share of the changes between readings that are smaller than half the resolution
 
 ONE_SETTING = 0.01  # of the setting: with .3 % between holds k1 is as open as with none
@@ -89,7 +90,7 @@ def copied_tests(tests: Mapping[str, CheckedTest]) -> dict[str, list[Notice]]:
         read = test.values[test.protocol.mask]
         settings = test.protocol.setting[test.protocol.recorded]
         first = names.setdefault((settings.tobytes(), read.tobytes()), name)
-        if first != name and np.unique(read).size >= LEAST_DIFFERENT:
+        if first != name and np.unique(read).size >= COPIED_TEST:
             text = (
                 f"its readings are those of experiment {first} once more: judged together they count twice, and "
                 "intervals are too narrow; leave one of the two out"
@@ -340,7 +341,7 @@ def repeated(readings: CheckedTest) -> str:
     """The same readings at two displacements, as rows that were copied and not changed leave them."""
     known: dict[tuple[float, ...], int] = {}
     for j, row in enumerate(readings.each):
-        if len(set(row.tolist())) < COPIED:
+        if len(set(row.tolist())) < COPIED_HOLD:
             continue
         first = known.setdefault(tuple(row.tolist()), j)
         if readings.setting[first] != readings.setting[j]:
