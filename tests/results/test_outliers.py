@@ -58,6 +58,48 @@ def test_creep_is_compared_per_metre_of_length_and_said_so():
     assert "B per m of length is 0.8" in found["sentence"]
 
 
+def creeping(unit_N, unit_s, odd=1.0, tension_N=40.0):
+    """Specimens with powers of their own, of which the last creeps by a factor more at the tension of the test."""
+    rng = np.random.default_rng(1)
+    rows = []
+    for i in range(12):
+        own = np.exp(0.02 * rng.normal(size=2)) * (odd if i == 11 else 1.0)
+        U, N = 0.8 + 0.1 * rng.normal(), 0.6 + 0.1 * rng.normal()
+        tension, time = tension_N / unit_N, 300.0 / unit_s
+        creep, exponent = 0.3 * own[0], 0.7 * own[1]
+        middles = {"B": creep * tension**-U, "U": U, "k2": exponent * time**-N, "N": N}
+        known = {name: {"q05": 0.99 * v, "q50": v, "q95": 1.01 * v} for name, v in middles.items()}
+        at = {"B": creep, "k2": exponent}
+        typical = {name: {"q05": 0.99 * v, "q50": v, "q95": 1.01 * v} for name, v in at.items()}
+        typical |= {"tension_N": tension, "time_s": time}
+        about = {"name": f"s{i}", "material": "line", "length_mm": 1000.0}
+        rows.append(about | {"parameters": known, "at_typical": typical})
+    return rows
+
+
+@pytest.mark.parametrize("units", [(1.0, 1.0), (1000.0, 60.0), (1e-3, 1e-3)])
+def test_creep_is_compared_in_the_scales_of_the_tests_whatever_is_called_a_newton(units):
+    assert not outliers(creeping(*units))
+    found = {o["parameter"]: o for o in outliers(creeping(*units, odd=1.5))}
+    assert set(found) == {"B", "k2"} and {o["experiment"] for o in found.values()} == {"s11"}
+    assert found["B"]["value"] == pytest.approx(0.45, rel=0.05)
+    tension, time = (f"{value:.3g}" for value in (40.0 / units[0], 300.0 / units[1]))
+    assert f"s11: creep at {float(tension):.9g} N in mm per m of length is" in found["B"]["sentence"]
+    assert f"s11: k2 t^N after {float(time):.9g} s is" in found["k2"]["sentence"]
+
+
+@pytest.mark.parametrize("odd", [1.0, 1.5])
+def test_a_specimen_tested_at_another_tension_is_compared_at_that_of_the_others(odd):
+    rows = creeping(1.0, 1.0)
+    last = rows[-1]
+    grown = 10.0 ** last["parameters"]["U"]["q50"]
+    creep = {name: odd * grown * value for name, value in last["at_typical"]["B"].items()}
+    last["at_typical"] |= {"tension_N": 400.0, "B": creep}
+    found = outliers(rows)
+    assert [o["parameter"] for o in found] == ["B"] * (odd > 1.0)
+    assert all(o["value"] == pytest.approx(0.45, rel=0.05) for o in found)
+
+
 def test_a_low_specimen_lies_below_and_the_farthest_comes_first():
     found = outliers([*lot(), row("low", 500.0), row("lower", 200.0)])
     assert [o["experiment"] for o in found] == ["lower", "low"]

@@ -16,16 +16,19 @@ from wirebayes.discovery.model_check import write_checks
 from wirebayes.discovery.search import catalogue_without, investigate
 from wirebayes.discovery.settings import ALPHA, Settings
 from wirebayes.effects import catalogue
+from wirebayes.inference.fit import Fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.next_hold import write_next_hold
 from wirebayes.io.run_folder import read_json
-from wirebayes.json_files.batch import DiscoveryColumns, FitColumns, Row
+from wirebayes.json_files.batch import AtTypical, DiscoveryColumns, FitColumns, Row
 from wirebayes.json_files.summary import Parameter, SummaryJson
-from wirebayes.json_files.values import Statistics
+from wirebayes.json_files.values import Quantiles, Statistics
 from wirebayes.model.spec import ModelSpec
+from wirebayes.numeric.typing import Array
 from wirebayes.processes.workers import one_thread_each
 from wirebayes.progress import silent
+from wirebayes.results.contraction import interval
 from wirebayes.results.jobs import Job, fit_job, store
 from wirebayes.views.posterior import POSTERIOR, SUMMARY
 
@@ -137,6 +140,7 @@ def empty_row(name: str, file: str) -> Row:
         "readings": None,
         "converged": None,
         "parameters": {},
+        "at_typical": None,
         "verdict": None,
         "effects": [],
         "best_effect": None,
@@ -150,30 +154,32 @@ def empty_row(name: str, file: str) -> Row:
 def _fitted(experiment: Experiment, task: BatchTask, folder: Path) -> FitColumns:
     about = {"data_file": experiment.source.name, "version": __version__, "data_sha256": _hash(experiment)}
     job = Job(experiment.name, (experiment,), (), task.own_effects, task.spec, about)
-    _fit_and_store(job, folder, task, draws=task.posteriors)
+    fit = _fit_and_store(job, folder, task, draws=task.posteriors)
     if task.posteriors:
         write_next_hold(experiment, folder / experiment.name)
     if task.check:
         write_checks([job], folder, task.seed, silent, map, task.simulations)
     summary: SummaryJson = read_json(folder / experiment.name / SUMMARY)
     check = summary.get("model_check")
-    return _columns(summary, check and check["p"], check and check["passed"])
+    return _columns(summary, fit, check and check["p"], check and check["passed"])
 
 
-def _fit_and_store(job: Job, folder: Path, task: BatchTask, *, draws: bool) -> None:
+def _fit_and_store(job: Job, folder: Path, task: BatchTask, *, draws: bool) -> Fit:
     """Fit and store; nothing would go on from a checkpoint in a folder that is gone afterwards."""
     for place in job.folders:
         (folder / place).mkdir(parents=True)
-    store(job, fit_job(job, task.seed, task.policy), folder, task.seed, task.policy, draws=draws)
+    fit = fit_job(job, task.seed, task.policy)
+    store(job, fit, folder, task.seed, task.policy, draws=draws)
+    return fit
 
 
 def _discovered(experiment: Experiment, task: BatchTask, folder: Path) -> DiscoveryColumns:
     kinds = catalogue_without(task.without, catalogue(task.own_effects))
     found = investigate([experiment], Settings(task.spec, kinds, task.simulations), task.seed)
-    jobs = plain_jobs([experiment], task.spec, task.own_effects)
-    jobs += jobs_of(found, task.spec, task.own_effects)
-    for job in jobs:
-        _fit_and_store(job, folder, task, draws=True)  # pictures show them
+    (job,) = plain_jobs([experiment], task.spec, task.own_effects)
+    plain = _fit_and_store(job, folder, task, draws=True)  # pictures show them
+    for job in jobs_of(found, task.spec, task.own_effects):
+        _fit_and_store(job, folder, task, draws=True)
     write_findings(found, folder, task.own_effects)
     own_folder = folder / experiment.name
     if task.posteriors:
@@ -183,7 +189,7 @@ def _discovered(experiment: Experiment, task: BatchTask, folder: Path) -> Discov
     # the check of a fit is this global test
     p = report["p_global"]
     return {
-        **_columns(summary, p, p > ALPHA),
+        **_columns(summary, plain, p, p > ALPHA),
         "verdict": report["verdict"],
         "effects": report["effects"],
         "best_effect": report["best"],
@@ -191,7 +197,7 @@ def _discovered(experiment: Experiment, task: BatchTask, folder: Path) -> Discov
     }
 
 
-def _columns(summary: SummaryJson, p: float | None, passed: bool | None) -> FitColumns:
+def _columns(summary: SummaryJson, fit: Fit, p: float | None, passed: bool | None) -> FitColumns:
     parameters = {name: _statistics(parameter) for name, parameter in summary["parameters"].items()}
     check = None
     if passed is not None:
@@ -199,10 +205,31 @@ def _columns(summary: SummaryJson, p: float | None, passed: bool | None) -> FitC
     return {
         "converged": summary["converged"],
         "parameters": parameters,
+        "at_typical": _at_typical(fit),
         "warnings": summary["warnings"],
         "p_global": p,
         "check": check,
     }
+
+
+def _at_typical(fit: Fit) -> AtTypical:
+    """B and k2 at the test's typical tension and after its typical hold."""
+    (sample,) = fit.problem.samples
+    typical = sample.model.typical
+    wire = fit.problem.parameters(fit.flat, sample)
+    creep_mm = wire["B"] * typical.tension_N ** wire["U"]
+    exponent = wire["k2"] * typical.hold_s ** wire["N"]
+    return {
+        "tension_N": typical.tension_N,
+        "time_s": typical.hold_s,
+        "B": _quantiles(creep_mm),
+        "k2": _quantiles(exponent),
+    }
+
+
+def _quantiles(values: Array) -> Quantiles:
+    low, middle, high = interval(values)
+    return {"q05": low, "q50": middle, "q95": high}
 
 
 def _statistics(parameter: Parameter) -> Statistics:

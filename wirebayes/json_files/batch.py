@@ -3,8 +3,20 @@
 from typing import TypedDict
 
 from wirebayes.json_files.discovery import Verdict
-from wirebayes.json_files.values import Statistics
+from wirebayes.json_files.values import Quantiles, Statistics
 from wirebayes.result_warnings import Warned
+
+
+class AtTypical(TypedDict):
+    """B and k2 in a specimen's own scales, as specimens are compared: creep, mm, at a tension, and k2 t^N after a time.
+
+    B and k2 themselves are those at one newton and after one second, whatever these are to the wire.
+    """
+
+    tension_N: float
+    time_s: float
+    B: Quantiles
+    k2: Quantiles
 
 
 class FitColumns(Warned):
@@ -12,6 +24,7 @@ class FitColumns(Warned):
 
     converged: bool | None
     parameters: dict[str, Statistics]
+    at_typical: AtTypical | None
     p_global: float | None
     check: str | None
 
@@ -39,8 +52,9 @@ class Row(DiscoveryColumns):
 class OutlierRow(TypedDict):
     """A parameter of a specimen that lies far from those of the others of its material.
 
-    `value` is the specimen's posterior median, `median` that of all specimens of the material, B per m of length; `z`
-    robust standard deviations lie between them. `specimens` of the material were compared.
+    `value` is the specimen's posterior median, `median` that of all specimens of the material; `z` robust standard
+    deviations lie between them. For B these are of the creep in mm per m of length at a tension, for k2 of the exponent
+    k2 t^N after a time; the sentence names which. `specimens` of the material were compared.
     """
 
     experiment: str

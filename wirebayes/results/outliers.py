@@ -3,15 +3,18 @@
 A robust z: the distance of a specimen's posterior median from the median of all specimens of the material, divided by
 the expected distance, which combines the spread of the specimens (from the median absolute deviation) and the width of
 this specimen's posterior. Neither a few outliers nor one badly determined specimen affects it much.
+
+B and k2 are compared at the typical tension and after the typical hold of the material's tests: how far specimens of
+other exponents lie apart in the creep at one newton depends on what is called a newton.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from scipy.special import stdtrit
 
 from wirebayes.json_files.batch import OutlierRow, Row
-from wirebayes.json_files.values import INTERVAL
+from wirebayes.json_files.values import INTERVAL, Quantiles
 from wirebayes.numeric.typing import Array
 from wirebayes.sentences import short
 
@@ -55,7 +58,7 @@ def outliers(rows: Iterable[Row]) -> list[OutlierRow]:
 
 def _far_off(material: str, name: str, specimens: list[Row], limit: float) -> list[OutlierRow]:
     """The specimens of a material whose parameter has a z beyond a limit."""
-    low, value, high = _intervals(name, specimens)
+    label, (low, value, high) = _compared(name, specimens)
     if (low > 0).all():
         z = robust_z(np.log(value), np.log(high / low) / _NINETY)
     else:
@@ -63,29 +66,66 @@ def _far_off(material: str, name: str, specimens: list[Row], limit: float) -> li
     median = float(np.median(value))
     found = []
     for i in np.flatnonzero(np.abs(z) > limit):
-        found.append(_row(specimens[i]["name"], material, name, float(value[i]), median, float(z[i]), len(z)))
+        experiment = specimens[i]["name"]
+        outlier = _row(experiment, material, name, label, float(value[i]), median, float(z[i]), len(z))
+        found.append(outlier)
     return found
 
 
-def _intervals(name: str, specimens: list[Row]) -> tuple[Array, Array, Array]:
-    """Ends of the interval of a parameter and the median between them, of each specimen."""
-    intervals = []
-    for row in specimens:
+def _compared(name: str, specimens: list[Row]) -> tuple[str, Array]:
+    """What is compared of a parameter, in words, and (3, n) ends of its interval and the median between them."""
+    typical = [row.get("at_typical") for row in specimens]
+    if name == "B":
+        label = "B per m of length"
+        intervals = _quantiles([row["parameters"][name] for row in specimens])
+        known = [(one["B"], one["tension_N"]) for one in typical if one and one["B"]["q05"] > 0.0]
+        if len(known) == len(specimens):
+            intervals, tension_N = _at_one_scale("U", specimens, known)
+            label = f"creep at {short(tension_N, 3)} N in mm per m of length"
         # an elongation: specimens may differ in length
-        metres = float(row["length_mm"] or np.nan) / 1e3 if name == "B" else 1.0
-        figures = row["parameters"][name]
-        intervals.append([figures[quantile] / metres for quantile in INTERVAL])
-    low, value, high = np.array(intervals).T
-    return low, value, high
+        metres = np.array([float(row["length_mm"] or np.nan) / 1e3 for row in specimens])
+        return label, intervals / metres
+    known = [(one["k2"], one["time_s"]) for one in typical if one and one["k2"]["q05"] > 0.0]
+    if name == "k2" and len(known) == len(specimens):
+        intervals, time_s = _at_one_scale("N", specimens, known)
+        return f"k2 t^N after {short(time_s, 3)} s", intervals
+    return name, _quantiles([row["parameters"][name] for row in specimens])
+
+
+def _quantiles(figures: Sequence[Quantiles]) -> Array:
+    """(3, n) ends of intervals and the medians between them."""
+    return np.array([[of[quantile] for of in figures] for quantile in INTERVAL])
+
+
+def _at_one_scale(exponent: str, specimens: list[Row], known: Sequence[tuple[Quantiles, float]]) -> tuple[Array, float]:
+    """What is known at each specimen's own tension or time, at the middle one of the material, and this.
+
+    Parameters
+    ----------
+    exponent : str
+        The parameter that says with which power of the tension or the time it grows.
+    specimens : list of Row
+    known : sequence of (Quantiles, float)
+        With the tension or time, a specimen each.
+    """
+    own = np.log([scale for _, scale in known])
+    middle = float(np.median(own))
+    away = middle - own
+    low, power, high = _quantiles([row["parameters"][exponent] for row in specimens])
+    below, value, above = np.log(_quantiles([of for of, _ in known]))
+    # the power is hardly correlated with what is known at the own scale
+    moved = value + power * away
+    to_low = np.hypot(value - below, (high - low) / 2.0 * away)
+    to_high = np.hypot(above - value, (high - low) / 2.0 * away)
+    return np.exp(np.array([moved - to_low, moved, moved + to_high])), float(np.exp(middle))
 
 
 def _row(
-    experiment: str, material: str, parameter: str, value: float, median: float, z: float, specimens: int
+    experiment: str, material: str, parameter: str, label: str, value: float, median: float, z: float, specimens: int
 ) -> OutlierRow:
-    called = f"{parameter} per m of length" if parameter == "B" else parameter
     side = "above" if z > 0 else "below"
     sentence = (
-        f"{experiment}: {called} is {short(value, 4)}, {abs(z):.1f} robust standard deviations {side} "
+        f"{experiment}: {label} is {short(value, 4)}, {abs(z):.1f} robust standard deviations {side} "
         f"the median of {specimens} specimens of {material}, {short(median, 4)}"
     )
     return {

@@ -110,6 +110,9 @@ def _reliability(rows: list[Row]) -> Points:
     return Points("How far it can be trusted", points or ["All fits converged."])
 
 
+_COMPARED = "Of B, the creep per metre of length at the typical tension; of k2, k2 t^N after the typical hold."
+
+
 def _outliers(fitted: list[Row], far: list[OutlierRow]) -> list[Block]:
     specimens = Counter(row["material"] for row in fitted if row["material"])
     small = sorted(material for material, count in specimens.items() if count < LEAST_SPECIMENS)
@@ -131,7 +134,7 @@ def _outliers(fitted: list[Row], far: list[OutlierRow]) -> list[Block]:
         figures = [number(row["value"]), number(row["median"]), number(row["z"], 2)]
         lines.append([*which, *figures])
     header = ["experiment", "material", "parameter", "its median", "median of the material", "robust z"]
-    table = Table(header, lines, "B is per metre of length.")
+    table = Table(header, lines, _COMPARED)
     return [table, Text(rule)]
 
 
