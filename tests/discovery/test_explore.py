@@ -281,7 +281,7 @@ class Fits:
         monkeypatch.setattr(stepwise, "expand", lambda target, z, trials: None)
         monkeypatch.setattr(stepwise, "scan", lambda x: None)
         monkeypatch.setattr(stepwise.screening, "candidate_probes", lambda blocks, kinds: (["probe"], ["candidate"]))
-        monkeypatch.setattr(stepwise.screening, "log_bayes", lambda c, scans: [[scanned]])
+        monkeypatch.setattr(stepwise.screening, "scanned", lambda c, scans: SimpleNamespace(log_bayes=[scanned]))
 
     def fit(self) -> stepwise.FittedSet:
         rng = np.random.default_rng(0)

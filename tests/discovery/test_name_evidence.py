@@ -61,11 +61,11 @@ def test_an_alarm_is_raised_below_four_per_cent_and_not_above(monkeypatch: pytes
 @pytest.mark.parametrize("one_sided", [True, False])
 def test_evidence_is_the_likelihood_averaged_over_the_prior(one_sided: bool) -> None:
     for best in (6.0, 15.0, 30.0):
-        found = screening.log_bayes(Candidate(0, "toe", (0,), True), [scan_of(np.array([best]), one_sided)])[0]
+        found = screening.scanned(Candidate(0, "toe", (0,), True), [scan_of(np.array([best]), one_sided)]).log_bayes
         assert found[0] == pytest.approx(log_evidence(best, one_sided), abs=1e-6)
     # on two samples with an amplitude each, the prior is paid for twice
     both = [scan_of(np.array([best]), one_sided) for best in (6.0, 15.0)]
-    found = screening.log_bayes(Candidate(0, "toe", (0, 1), False), both)[0]
+    found = screening.scanned(Candidate(0, "toe", (0, 1), False), both).log_bayes
     assert found[0] == pytest.approx(log_evidence(6.0, one_sided) + log_evidence(15.0, one_sided), abs=1e-6)
 
 

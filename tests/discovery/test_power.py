@@ -1,5 +1,6 @@
 """Similar effects and what to measure next: cosines by hand, and plans that are what their words say."""
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -87,30 +88,34 @@ def test_the_probe_that_shows_best_says_what_is_detectable(monkeypatch: pytest.M
     assert {name: k for name, (k, _) in there.items()} == {"a": 1, "b": 3}
 
 
+def smallest_seen(rungs: Sequence[tuple[float, int, float | None]]) -> power.Detectable:
+    return power.smallest_seen([power.Rung(*rung) for rung in rungs])
+
+
 def test_an_effect_that_grows_with_the_square_of_its_amplitude_is_not_promised_by_its_largest_probe() -> None:
     """δ = (10 a)², seen from 4 on, so at 0.2: the probe at 0.9 alone would promise 4 / 90 = 0.044."""
     steps = (0.03, 0.1, 0.3, 0.9)
     rungs = [(step, k, 4.0 * step / (10.0 * step) ** 2) for k, step in enumerate(steps)]
-    assert power.smallest_seen(rungs) == (2, pytest.approx(0.2))
+    assert smallest_seen(rungs) == (2, pytest.approx(0.2))
     linear = [(step, k, 0.05) for k, step in enumerate(steps)]
-    assert power.smallest_seen(linear) == (1, pytest.approx(0.05))
-    assert power.smallest_seen([(0.1, 7, 0.02)]) == (7, 0.02)  # a form that is linear has one probe
-    assert power.smallest_seen([(0.1, 7, 0.5)]) == (7, 0.5)
-    assert power.smallest_seen([(0.1, 0, None), (0.3, 1, 0.2)]) == (1, 0.3)  # nothing is known in between
-    assert power.smallest_seen([(0.1, 0, 0.9), (0.3, 1, None)]) == (1, None)
+    assert smallest_seen(linear) == (1, pytest.approx(0.05))
+    assert smallest_seen([(0.1, 7, 0.02)]) == (7, 0.02)  # a form that is linear has one probe
+    assert smallest_seen([(0.1, 7, 0.5)]) == (7, 0.5)
+    assert smallest_seen([(0.1, 0, None), (0.3, 1, 0.2)]) == (1, 0.3)  # nothing is known in between
+    assert smallest_seen([(0.1, 0, 0.9), (0.3, 1, None)]) == (1, None)
 
 
 def test_an_effect_that_saturates_is_not_promised_to_be_seen_at_some_size() -> None:
     """Beyond the largest probe the share of what is needed grows as it did before; far beyond nothing is said."""
     root = [(step, k, 2.0 * step**0.5) for k, step in enumerate((1.0, 3.0))]  # half of what is needed at 1
-    assert power.smallest_seen(root) == (1, pytest.approx(4.0))
+    assert smallest_seen(root) == (1, pytest.approx(4.0))
     linear = [(step, k, 5.0) for k, step in enumerate((1.0, 3.0))]
-    assert power.smallest_seen(linear) == (1, pytest.approx(5.0))
+    assert smallest_seen(linear) == (1, pytest.approx(5.0))
     for needed, found in ((8.9, pytest.approx(8.9)), (9.1, None)):
-        assert power.smallest_seen([(1.0, 0, needed), (3.0, 1, needed)]) == (1, found)
+        assert smallest_seen([(1.0, 0, needed), (3.0, 1, needed)]) == (1, found)
     for needed in (6.0 - 1e-9, 6.1):  # it shows hardly more at three than at one, or less
-        assert power.smallest_seen([(1.0, 0, 2.0), (3.0, 1, needed)]) == (1, None)
-    assert power.smallest_seen([(1.0, 0, None), (3.0, 1, 4.0)]) == (1, None)
+        assert smallest_seen([(1.0, 0, 2.0), (3.0, 1, needed)]) == (1, None)
+    assert smallest_seen([(1.0, 0, None), (3.0, 1, 4.0)]) == (1, None)
 
 
 def test_no_amplitude_is_promised_that_the_effect_cannot_have(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,14 +27,14 @@ Message = MutableMapping[str, Any]
 Send = Callable[[Message], Awaitable[None]]
 
 
-def serve(folder: Path, port: int | None = None, *, seed: int = 0, browse: bool = True) -> None:
+def serve(folder: Path, port: int | None, *, seed: int, browse: bool) -> None:
     """Serve the app until Ctrl-C.
 
     Parameters
     ----------
     folder : Path
         Of the results.
-    port : int, optional
+    port : int or None
         Any free one where it is 0; 8137, or a free one, when left out.
     seed : int
         Of all fits.

@@ -123,27 +123,27 @@ def _checked(experiment: Experiment, kinds: Kinds, seed: int) -> CheckedExperime
     }
 
 
-def _understood(e: Experiment) -> Understood:
+def _understood(experiment: Experiment) -> Understood:
     """What the files say, as plain values."""
-    recorded = e.recorded_holds
+    recorded = experiment.recorded_holds
     measured = [hold.temperature_C for hold in recorded if hold.temperature_C is not None]
     extremes = None
     if measured:
         temperatures = np.concatenate(measured)
         extremes = [float(temperatures.min()), float(temperatures.max())]
     found: Understood = {
-        "material": e.material,
-        "length_mm": e.length_mm,
-        "control": e.control,
-        "resolution_N": e.resolution or None,
-        "holds": [_hold(hold) for hold in e.holds],
+        "material": experiment.material,
+        "length_mm": experiment.length_mm,
+        "control": experiment.control,
+        "resolution_N": experiment.resolution or None,
+        "holds": [_hold(hold) for hold in experiment.holds],
         "recorded_holds": len(recorded),
-        "unrecorded_holds": len(e.holds) - len(recorded),
+        "unrecorded_holds": len(experiment.holds) - len(recorded),
         "readings": sum(hold.time_s.size for hold in recorded),
-        "duration_s": sum(hold.duration_s for hold in e.holds),
+        "duration_s": sum(hold.duration_s for hold in experiment.holds),
         "temperature_C": extremes,
     }
-    return in_unit(found, READ_UNIT[e.control])
+    return in_unit(found, READ_UNIT[experiment.control])
 
 
 def _hold(hold: Hold) -> HoldUnderstood:

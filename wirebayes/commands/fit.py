@@ -191,7 +191,7 @@ def _compute(jobs: Sequence[Job], folder: Path, seed: int, check: bool, policy: 
 
 
 def fits_in(
-    place: ResultFolder, folders: Sequence[str], own_effects: Path | None = None, *, computed: bool = False
+    place: ResultFolder, folders: Sequence[str], own_effects: Path | None, *, computed: bool = False
 ) -> Posterior | Posteriors:
     """What `fit` returns of a folder that holds these fits.
 
@@ -201,7 +201,7 @@ def fits_in(
         The folder.
     folders : sequence of str
         Names of the fits within it.
-    own_effects : Path, optional
+    own_effects : Path or None
         File of a user's own effects.
     computed : bool
         True where they were computed now, not found done.

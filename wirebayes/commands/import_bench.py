@@ -230,10 +230,8 @@ def _read_all(
         join = partial(_joined, paths, samples[0])
         joined, choices = _decided(join, choices, ask)
         return [joined], choices
-    names = [(path, test.experiment.name) for path, test in tests]
-    _check_names(names)
-    by_file = [(path.name, test) for path, test in tests]
-    return by_file, choices
+    _check_names([(path, test.experiment.name) for path, test in tests])
+    return [(path.name, test) for path, test in tests], choices
 
 
 def _joined(paths: Sequence[Path], about: About, choices: Choices) -> _WithFiles:

@@ -19,7 +19,7 @@ from wirebayes.prediction.table import (
     mixture_table,
     unlikely_readings,
 )
-from wirebayes.result_warnings import to_json
+from wirebayes.result_warnings import Notice, to_json
 from wirebayes.results import read_back
 from wirebayes.results.mixture import members_of
 from wirebayes.results.read_back import Stored
@@ -106,12 +106,19 @@ def predict(
     doubts = [doubt for _, stored in members for doubt in stored.doubts]
     doubts += beyond_tested(rows, first)
     doubts += unlikely_readings(requests, seed)
-    notices = to_json(doubts)
-    attributes: dict[str, Any] = {"prediction": _sentence(requests), "seed": seed}
-    if notices:  # in two attributes, for netCDF holds text but no mappings
-        attributes["warnings"] = [notice["text"] for notice in notices]
-        attributes["warning_kinds"] = [notice["kind"] for notice in notices]
+    attributes = {"prediction": _sentence(requests), "seed": seed, **_warnings(doubts)}
     return dataset(rows, attributes, control)
+
+
+def _warnings(doubts: Sequence[Notice]) -> dict[str, Any]:
+    """What speaks against a prediction, in two attributes because netCDF holds text but no mappings."""
+    notices = to_json(doubts)
+    if not notices:
+        return {}
+    return {
+        "warnings": [notice["text"] for notice in notices],
+        "warning_kinds": [notice["kind"] for notice in notices],
+    }
 
 
 def _sentence(requests: Sequence[tuple[float, ProtocolRequest]]) -> str:
@@ -142,9 +149,9 @@ def _check_output(output: Path, protocol: Any) -> None:
 
 def stored_posteriors(
     posterior: PathLike | Posterior | Posteriors | Findings,
-    experiment: str | None = None,
-    model: str | None = None,
-    own_effects: Path | None = None,
+    experiment: str | None,
+    model: str | None,
+    own_effects: Path | None,
 ) -> list[tuple[float, Stored]]:
     """Draws and models of one experiment with their probabilities, from what `predict` is given.
 
@@ -154,11 +161,11 @@ def stored_posteriors(
     ----------
     posterior : path, Posterior, Posteriors or Findings
         A folder that `fit` or `discover` wrote, or what they returned.
-    experiment : str, optional
+    experiment : str or None
         May be left out where there is one.
-    model : {"plain", "final"}, optional
+    model : {"plain", "final"} or None
         Of what `discover` found; final when left out.
-    own_effects : Path, optional
+    own_effects : Path or None
         File of a user's own effects, for a folder.
 
     Returns
@@ -214,16 +221,16 @@ def _folders_by_experiment(folder: Path) -> dict[str, list[Path]]:
     return found
 
 
-def find_posterior(folder: Path, experiment: str | None = None, model: str | None = None) -> tuple[str, Path]:
+def find_posterior(folder: Path, experiment: str | None, model: str | None) -> tuple[str, Path]:
     """Find the posterior of one experiment in a folder.
 
     Parameters
     ----------
     folder : Path
         What `fit` or `discover` wrote, or the folder of one posterior itself.
-    experiment : str, optional
+    experiment : str or None
         May be left out where there is one.
-    model : {"plain", "final"}, optional
+    model : {"plain", "final"} or None
         Of what `discover` found; final when left out.
 
     Returns

@@ -215,7 +215,8 @@ def _check_protocol(
 ) -> None:
     """Refuse what no bench could do."""
     _check_lengths(lengths)
-    least, shortest = min(path), min(lengths)
+    least = min(path)
+    shortest = min(lengths)
     if control == "force" and least <= 0:
         raise InputError(f"--weights: found {least:g}, expected more than 0 N")
     if control == "displacement" and least <= -shortest:
@@ -223,9 +224,9 @@ def _check_protocol(
     is_rising = all(before < after for before, after in pairwise(times))
     if times[0] < 0 or not is_rising:
         raise InputError(f"--times: found {text_of(times)!r}, expected rising times from 0 s on")
-    last = len(path) - 1
-    if not unrecorded <= set(range(1, last + 1)):
-        raise InputError(f"--unrecorded: found {max(unrecorded)}, expected a hold from 1 to {last}")
+    possible = range(1, len(path))
+    if not unrecorded <= set(possible):
+        raise InputError(f"--unrecorded: found {max(unrecorded)}, expected a hold from 1 to {len(path) - 1}")
 
 
 def _check_lengths(lengths: Sequence[float]) -> None:

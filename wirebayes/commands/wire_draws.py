@@ -112,7 +112,8 @@ def draws_of_specimens(
     each = [usable_draws(stored, str(folder), count) for folder, stored in zip(folders, tests, strict=True)]
     _check_plain_and_alike(folders, each)
     first = each[0]
-    typical = Typical(*(geometric_mean(one.typical[i] for one in each) for i in range(2)))
+    typical_N = geometric_mean(one.typical.tension_N for one in each)
+    typical = Typical(typical_N, geometric_mean(one.typical.hold_s for one in each))
     logarithms = [_at_typical(_log_core_of_length(stored, first.length_mm), typical) for stored in tests]
     log_prior = _at_typical(_log_core(read_back.prior_draws(folders[0], experiment)), typical)
     prior = log_prior.mean(0), np.cov(log_prior.T)

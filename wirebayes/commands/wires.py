@@ -61,7 +61,7 @@ def robot_of(robot: RobotLike) -> Robot:
     return at_home(robot if isinstance(robot, Robot) else read_robot(robot))
 
 
-def posterior_of(wires: Wires | None, experiment: str | None = None) -> Path | str:
+def posterior_of(wires: Wires | None, experiment: str | None) -> Path | str:
     """The posterior that decides a result; of several lines, what tells them all; empty where there is none."""
     if wires is None:
         return ""
@@ -123,9 +123,9 @@ def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effect
         A folder with a ``posterior.nc``, or what `fit` or `discover` returned.
     count : int
         Largest number of draws.
-    experiment : str, optional
+    experiment : str or None
         May be left out where there is one.
-    own_effects : Path, optional
+    own_effects : Path or None
         File of a user's own effects, for a folder.
 
     Raises
@@ -151,7 +151,7 @@ def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effect
 
 
 def draws_for(
-    robot: Robot, wires: Wires | None, count: int, experiment: str | None = None, own_effects: Path | None = None
+    robot: Robot, wires: Wires | None, count: int, experiment: str | None, own_effects: Path | None
 ) -> WireDraws:
     """`draws_of` for a robot, whose legs must fit the lines.
 
@@ -162,9 +162,9 @@ def draws_for(
         As for `draws_of`; None where the robot's file gives the parameters of all wires.
     count : int
         Largest number of draws.
-    experiment : str, optional
+    experiment : str or None
         May be left out where there is one.
-    own_effects : Path, optional
+    own_effects : Path or None
         File of a user's own effects, for a folder.
 
     Raises
@@ -212,16 +212,18 @@ def named_lines(texts: Sequence[str] | None) -> Wires | None:
     """What ``--wires`` was given: a line, or several times ``NAME=LINE``; a line is a folder, or some with commas."""
     if not texts:
         return None
-    pairs = [text.partition("=") for text in texts]
-    if len(texts) == 1 and (not pairs[0][1] or Path(texts[0]).exists()):
+    if len(texts) == 1 and ("=" not in texts[0] or Path(texts[0]).exists()):
         return _folders(texts[0])
-    for text, (name, sign, folder) in zip(texts, pairs, strict=True):
-        if not (name and sign and folder):
+    pairs = []
+    for text in texts:
+        name, _, folder = text.partition("=")
+        if not (name and folder):
             raise InputError(f"--wires: found {text!r} beside others, expected NAME=FOLDER for each")
-    names = [name for name, _, _ in pairs]
+        pairs.append((name, folder))
+    names = [name for name, _ in pairs]
     if len(set(names)) < len(names):
         raise InputError(f"--wires: found {', '.join(names)}, expected each name once")
-    return {name: _folders(folder) for name, _, folder in pairs}
+    return {name: _folders(folder) for name, folder in pairs}
 
 
 def _folders(text: str) -> Path | list[Path]:

@@ -72,12 +72,11 @@ def _weights_of_acting(
 ) -> dict[Key, float]:
     """Weights of what may act in block `i`: the final model, and fitted sets that differ only in undecided names."""
     weights: dict[Key, float] = {}
-    for s, weight in zip(found.sets, found.weights.values(), strict=True):
-        acting = frozenset(name for name in s.names if s.presence[name][i] > 0.5)
-        swapped = acting ^ names
-        is_fitted = acting and s.key == acting and fits.knows(acting)
-        is_undecided = swapped <= set(undecided)
-        if not swapped or (is_fitted and is_undecided):
+    for effects, weight in zip(found.sets, found.weights.values(), strict=True):
+        acting = frozenset(name for name in effects.names if effects.presence[name][i] > 0.5)
+        is_fitted = acting and effects.key == acting and fits.knows(acting)
+        differ_in_undecided = (acting ^ names) <= set(undecided)
+        if acting == names or (is_fitted and differ_in_undecided):
             before = weights.get(acting, 0.0)
             weights[acting] = before + weight
     weights.setdefault(names, 0.0)

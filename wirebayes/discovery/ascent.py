@@ -11,6 +11,7 @@ from wirebayes.discovery.tangent import Tangent, moving_columns, tangent
 from wirebayes.discovery.tangent_step import stepped
 from wirebayes.inference.laplace_fit import LaplaceFit, column_of
 from wirebayes.inference.log_posterior import LogPosterior
+from wirebayes.model.column_units import parameter_of
 from wirebayes.numeric.distributions import Normal
 from wirebayes.numeric.rows import put_rows, rows_of
 from wirebayes.numeric.typing import Array, Bools, Ints
@@ -78,10 +79,12 @@ def start(block: LaplaceFit, z: Array, readings: Sequence[Array] | None = None) 
         x = climbs.tangent(y, rows, free)
         no_signature = np.zeros_like(x.residual)
         here = weigh(x, no_signature, 0.0, 0.0, degrees)
+        height = _finite(here.height + x.prior)
         nothing = np.zeros(len(y))
-        return _Look(x, here, _Places(y, _finite(here.height + x.prior), nothing, nothing))
+        return _Look(x, here, _Places(y, height, nothing, nothing))
 
-    best = climbs.follow(look, _Places.unseen(z), np.arange(len(z)), free, _STEPS)
+    every = np.arange(len(z))
+    best = climbs.follow(look, _Places.unseen(z), every, free, _STEPS)
     height = np.where(best.log_bayes == _NEVER, -np.inf, best.log_bayes)
     return Start(best.z, height, readings, degrees)
 
@@ -104,7 +107,7 @@ def lead(block: LaplaceFit, ladder: AmplitudePath, begin: Start) -> PathEvidence
     n = begin.data_sets
     ascent, y = _begin(block, ladder, begin)
     moving = ascent.moving()
-    rigid = ascent.moving(but_for=ladder.effect.columns()[1:])
+    rigid = ascent.moving(but_for=ladder.effect.shape_columns)
     rungs = ladder.amplitudes.repeat(n, axis=1)
     low_below = 0.999 * np.abs(rungs[-1]) * FIRST / LAST
     best = _Places.unseen(y)
@@ -140,7 +143,18 @@ def _evidence(found: Sequence["_Places"], n: int) -> PathEvidence:
 
 @dataclass(frozen=True)
 class _Places:
-    """Places (m, d) of m climbs, and the log Bayes factor, the amplitude and δ per amplitude there, (m,) each."""
+    """Where m climbs are.
+
+    Attributes
+    ----------
+    z : (m, d) array
+    log_bayes : (m,) array
+        Log Bayes factor there.
+    amplitude : (m,) array
+        The effect's distance from neutral.
+    norm : (m,) array
+        δ per amplitude.
+    """
 
     z: Array
     log_bayes: Array
@@ -157,7 +171,7 @@ class _Places:
         """Take over, in place, the others' places where they are better than these in some rows, and say where."""
         better = other.log_bayes > self.log_bayes[rows]
         put_rows(self, rows[better], rows_of(other, better))
-        return np.asarray(better)
+        return better
 
 
 @dataclass(frozen=True)
@@ -217,8 +231,10 @@ class _Climbs:
             if step == steps or not len(go):
                 break
             rows = rows[go]
-            on = seen.tangent.of(go), seen.weighed.of(go)
-            z[rows] = stepped(self.target, z[rows], self._readings_of(rows), *on, free, self.degrees)
+            readings = self._readings_of(rows)
+            tangent = seen.tangent.of(go)
+            weighed = seen.weighed.of(go)
+            z[rows] = stepped(self.target, z[rows], readings, tangent, weighed, free, self.degrees)
         return best
 
     def tangent(self, z: Array, rows: Ints, moving: list[int]) -> Tangent:
@@ -229,14 +245,14 @@ class _Climbs:
     def best_start(self, values: Array) -> Array:
         """(n,) the largest value of each data set."""
         by_start = values.reshape(-1, self.data_sets)
-        return np.asarray(by_start.max(axis=0))
+        return by_start.max(axis=0)
 
     def _is_hopeful(self, rows: Ints, hope: Array, climbs: int) -> Bools:
         """Whether the data sets of some of the climbs may gain something, by what each of these hopes for."""
         every = np.full(climbs, -np.inf)
         every[rows] = hope
         by_set = self.best_start(every) >= _SETTLED
-        return np.asarray(by_set[rows % self.data_sets])
+        return by_set[rows % self.data_sets]
 
     def _readings_of(self, rows: Ints) -> list[Array] | None:
         """The readings of the data sets of some climbs, a sample each; None for the measured ones."""
@@ -272,7 +288,7 @@ class _Ascent(_Climbs):
         """The columns of the parameters that follow, without the amplitude and some columns of the effect."""
         names = self.target.problem.names
         columns = moving_columns(self.target.problem)
-        return [i for i in columns if i != self.column and names[i].split("[")[0] not in but_for]
+        return [i for i in columns if i != self.column and parameter_of(names[i]) not in but_for]
 
     def is_beyond(self, amplitudes: Array) -> bool:
         """Whether all amplitudes have reached their ends."""
@@ -308,7 +324,8 @@ class _Ascent(_Climbs):
             signature = x.parameters[..., -1] / self._scale
             here = weigh(without_last(x), signature, first[rows], last[rows], self.degrees)
             log_bayes = _finite(here.height + x.prior - self.nothing[rows])
-            return _Look(x, here, _Places(y, log_bayes, at[rows] + here.move, here.norm))
+            best_amplitude = at[rows] + here.move
+            return _Look(x, here, _Places(y, log_bayes, best_amplitude, here.norm))
 
         starts = len(z) // len(alive)
         rows = np.flatnonzero(np.tile(alive, starts))
@@ -379,7 +396,7 @@ def _at_each_start(ladder: AmplitudePath, plain: LogPosterior, z: Array, names: 
     effect = ladder.effect
     theta = plain.coordinates.to_natural(z)
     known = dict(zip(plain.problem.names, theta.T, strict=True))
-    neutral = {effect.columns()[0]: effect.amplitudes[0].neutral}
+    neutral = {effect.amplitude_column: effect.amplitudes[0].neutral}
     return np.concatenate([_extended(known, names, probe.own | neutral) for probe in ladder.probes])
 
 
@@ -391,6 +408,6 @@ def _extended(known: Mapping[str, Array], names: Sequence[str], added: Mapping[s
         if name in known:
             columns.append(known[name])
         else:
-            value = added[name.split("[")[0]]
+            value = added[parameter_of(name)]
             columns.append(np.full(n, value))
     return np.stack(columns, axis=1)

@@ -40,7 +40,7 @@ _LEVEL = 0.95  # of chance, which a name has to exceed by most to be tried first
 
 
 def strengths(ways: Sequence[AmplitudePath], climbed: Sequence[Mapping[int, PathEvidence]]) -> dict[Candidate, Array]:
-    """(n,) log Bayes factor of each of the ladders' candidates, with the prior of `screen.log_bayes`."""
+    """(n,) log Bayes factor of each of the ladders' candidates, with the prior of `screening.scanned`."""
     out = {}
     for ladder, each in zip(ways, climbed, strict=True):
         prior = occam(ladder.probes[0].one_sided)
@@ -58,7 +58,7 @@ def _strength(here: Sequence[PathEvidence], shared: bool, prior: float) -> Array
     amplitude = np.array([path.amplitude for path in here])
     norm = np.array([path.norm for path in here])
     value, _ = shared_amplitude(log_bayes, amplitude, norm)
-    return np.asarray(value.max(axis=0) + prior)
+    return value.max(axis=0) + prior
 
 
 class Continuation:

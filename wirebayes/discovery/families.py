@@ -18,6 +18,7 @@ from wirebayes.discovery.tangent import moving_columns, tangent
 from wirebayes.effects import CATALOGUE
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.log_posterior import LogPosterior
+from wirebayes.model.column_units import parameter_of
 from wirebayes.numeric.typing import Array
 
 Family = tuple[str, ...]
@@ -94,14 +95,14 @@ def refitted_probe(block: LaplaceFit, found: Refit, b: int) -> Probe:
     b : int
     """
     effect = found.effect
-    names = [name.split("[")[0] for name in block.problem_with(effect).names]
+    names = [parameter_of(name) for name in block.problem_with(effect).names]
     values = found.theta[found.blocks.index(b)].tolist()
     theta = dict(zip(names, values, strict=True))
     own = {column: theta[column] for column in effect.columns()}
     neutral = effect.amplitudes[0].neutral
     step = abs(found.amplitude - neutral) or found.sd
     away = found.amplitude if found.amplitude != neutral else neutral + step
-    own[effect.columns()[0]] = away
+    own[effect.amplitude_column] = away
     return Probe(effect, own, step, False)
 
 

@@ -1,6 +1,7 @@
 """Sets of effects that were fitted, with what could be added to each."""
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from numpy.random import Generator
 
@@ -61,6 +62,15 @@ class FittedSet:
         return replace(self, effects=replace(self.effects, log_bayes=log_bayes))
 
 
+class _Refitted(NamedTuple):
+    """A name refitted beside a set, by block, with the log Bayes factors of the set with it and of the name itself."""
+
+    of_set: float
+    own: float
+    parent: FittedSet
+    refits: dict[int, Refit]
+
+
 @dataclass(frozen=True)
 class Explored:
     """The sets that were looked at.
@@ -87,19 +97,19 @@ class Explored:
 
     def refits(self) -> dict[str, tuple[FittedSet, dict[int, Refit]]]:
         """Each name where it was refitted with the most evidence: beside which set, and how; the best name first."""
-        best: dict[str, tuple[float, float, FittedSet, dict[int, Refit]]] = {}
+        best: dict[str, _Refitted] = {}
         for parent in (self.root, *self.fitted.values()):
             further = parent.further
             if further is None:
                 continue
             for name in further.winners:
                 own = further.log_bayes[name]
-                value = parent.effects.log_bayes + own
-                if name not in best or value > best[name][0]:
-                    best[name] = value, own, parent, further.amplitudes(name)
+                of_set = parent.effects.log_bayes + own
+                if name not in best or of_set > best[name].of_set:
+                    best[name] = _Refitted(of_set, own, parent, further.amplitudes(name))
         # of names that are best together the one that explains most is better
-        order = sorted(best, key=lambda name: best[name][:2], reverse=True)
-        return {name: best[name][2:] for name in order}
+        order = sorted(best, key=lambda name: (best[name].of_set, best[name].own), reverse=True)
+        return {name: (best[name].parent, best[name].refits) for name in order}
 
 
 class Fits:
@@ -125,13 +135,15 @@ class Fits:
     def of(self, key: Key) -> list[LaplaceFit]:
         """The blocks with the effects of a set; its forms are those of the refit, or of a set that has them."""
         if key not in self._known:
-            self._known[key] = self._from_parent(key) if key in self._explored.parents else self._from_larger(key)
+            refitted = key in self._explored.parents
+            self._known[key] = self._from_parent(key) if refitted else self._from_larger(key)
         return self._known[key]
 
     def _from_parent(self, key: Key) -> list[LaplaceFit]:
         before, name = self._explored.parents[key]
         parent = self._explored.fitted.get(before, self._explored.root)
-        return added(parent, name, self._settings, self._rng)[0]
+        blocks, _ = added(parent, name, self._settings, self._rng)
+        return blocks
 
     def _from_larger(self, key: Key) -> list[LaplaceFit]:
         """Fits of a set that was not fitted itself, with its effects as the smallest fitted set around it has them."""

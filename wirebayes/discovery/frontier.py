@@ -14,7 +14,26 @@ from wirebayes.discovery.settings import FALLS_SHORT, MORE, REACH, SAME_EVIDENCE
 
 @dataclass
 class Frontier:
-    """Sets known by evidence alone, and which of them have been fitted."""
+    """Sets known by evidence alone, and which of them have been fitted.
+
+    Attributes
+    ----------
+    names : int
+        Names in the catalogue.
+    families : sequence of tuple of str
+        Names that look alike.
+    known : dict of set to EffectSet
+        With the evidence of the best order of its names.
+    fitted : dict of set to FittedSet
+    parents : dict of set to (set, name)
+        Beside which set it was refitted, and the name that was added.
+    credit : dict of set to float
+        Log Bayes factor that it may come to with a remainder beside it.
+    towards : list of set
+        Sets to be fitted because they lead to others.
+    pair : set of str
+        Two effects that may only show together; none where there are no such.
+    """
 
     names: int
     families: Sequence[Family] = ()

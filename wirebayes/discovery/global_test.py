@@ -272,10 +272,10 @@ def _strike_gross_errors(
         found = gross_errors.suspect(block, rival)
         if found is None:
             break
-        name, hold, left, value = found
-        block = _refitted_without(block, name, hold, left, rng)
-        gone = [s["reading"] for s in struck if (s["experiment"], s["hold"]) == (name, hold)]
-        reading = gross_errors.place_in_file(left, gone)
+        name, hold, place, value = found
+        block = _refitted_without(block, name, hold, place, rng)
+        gone = [one["reading"] for one in struck if one["experiment"] == name and one["hold"] == hold]
+        reading = gross_errors.place_in_file(place, gone)
         struck.append({"experiment": name, "hold": hold, "reading": reading, "log_bayes": value})
     return block, struck
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +17,27 @@ from wirebayes.result_warnings import Notice
 MOST = 0.05  # share of readings that may be called gross errors
 
 
-def suspect(block: LaplaceFit, rival: float) -> tuple[str, int, int, float] | None:
-    """The reading most likely to be a gross error: experiment, hold number, its place in the hold, log Bayes factor.
+class SuspectReading(NamedTuple):
+    """A reading that may be a gross error.
+
+    Attributes
+    ----------
+    experiment : str
+    hold : int
+        Its number.
+    place : int
+        Of the reading among those of the hold that are left, from 0.
+    log_bayes : float
+    """
+
+    experiment: str
+    hold: int
+    place: int
+    log_bayes: float
+
+
+def suspect(block: LaplaceFit, rival: float) -> SuspectReading | None:
+    """The reading most likely to be a gross error, if any.
 
     `rival` is the log Bayes factor of the best effect; a gross error must beat it and chance by a clear margin.
     """
@@ -35,7 +55,7 @@ def suspect(block: LaplaceFit, rival: float) -> tuple[str, int, int, float] | No
     at, j, r = cells[best]
     sample = samples[at]
     number = int(sample.protocol.number[j])
-    return sample.name, number, int(r), value
+    return SuspectReading(sample.name, number, int(r), value)
 
 
 def _one_reading_each(cells: Sequence[tuple[int, int, int]]) -> AddedColumns:

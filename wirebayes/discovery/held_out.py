@@ -60,9 +60,10 @@ class HeldOut:
 
     def times(self, unit: float) -> "HeldOut":
         """The same with readings written in a unit so many times smaller."""
-        each = np.array(self.readings_each)
-        squares, floor = self.squares * unit**2, self.floor * unit**2
-        return replace(self, squares=squares, floor=floor, elpd=self.elpd - each * np.log(unit))
+        squares = self.squares * unit**2
+        floor = self.floor * unit**2
+        elpd = self.elpd - np.array(self.readings_each) * np.log(unit)
+        return replace(self, squares=squares, floor=floor, elpd=elpd)
 
 
 def last_third(experiment: Experiment) -> int:
@@ -120,12 +121,17 @@ def _scored(sample: Sample, model: Model, own: dict[str, Array], train: int, rng
     log_p = likelihoods.held_out_density(line, carried, replace(measured, mask=left_out))
     draws = log_p.shape[1]
     elpd = logsumexp(or_impossible(log_p), axis=1) - np.log(draws)
-    holds = [_scored_hold(measured, line, carried, int(j), rng) for j in last]
+    holds = [_scored_hold(measured, line, carried, j, rng) for j in last.tolist()]
+    return _of_holds(holds, protocol.number[last].tolist(), elpd)
+
+
+def _of_holds(holds: Sequence["_ScoredHold"], numbers: list[int], elpd: Array) -> HeldOut:
+    """Scored holds with their numbers and log densities (h,) together."""
     error = np.concatenate([hold.error for hold in holds])
     floor = np.concatenate([hold.floor for hold in holds])
     inside = np.concatenate([hold.inside for hold in holds])
     return HeldOut(
-        holds=[int(n) for n in protocol.number[last]],
+        holds=numbers,
         squares=float((error**2).mean()),
         readings=len(error),
         floor=float(floor.mean()),
@@ -166,7 +172,10 @@ def _scored_hold(
 def gap_closed(plain: HeldOut, final: HeldOut) -> float | None:
     """1 - (rmse_final² - s²) / (rmse_plain² - s²), s the final model's noise floor; None when plain is below it."""
     excess = plain.squares - final.floor
-    return None if excess <= 0 else float(1.0 - (final.squares - final.floor) / excess)
+    if excess <= 0:
+        return None
+    left = final.squares - final.floor
+    return float(1.0 - left / excess)
 
 
 def truncated_leave_one_hold_out(block: LaplaceFit, rng: Generator) -> Array:
@@ -178,15 +187,14 @@ def truncated_leave_one_hold_out(block: LaplaceFit, rng: Generator) -> Array:
     Posteriors are scored by `wirebayes.prediction.leave_one_hold_out.smoothed_leave_one_hold_out`.
     """
     problem, theta = _draws(block, rng, 1500)
-    values = np.concatenate(
-        [v[s.protocol.recorded] for v, s in zip(problem.leave_one_hold_out(theta), problem.samples, strict=True)]
-    )
+    of_samples = zip(problem.leave_one_hold_out(theta), problem.samples, strict=True)
+    values = np.concatenate([of_holds[sample.protocol.recorded] for of_holds, sample in of_samples])
     values = np.where(np.isfinite(values), values, -1e6)
     log_weight = -values - logsumexp(-values, axis=1, keepdims=True)
     ceiling = -0.5 * np.log(values.shape[1])
     log_weight = np.minimum(log_weight, ceiling)
     log_weight -= logsumexp(log_weight, axis=1, keepdims=True)
-    return np.asarray(logsumexp(log_weight + values, axis=1))
+    return logsumexp(log_weight + values, axis=1)
 
 
 class LeftOut:
@@ -205,13 +213,15 @@ class LeftOut:
 
     def of(self, fits: Sequence[LaplaceFit]) -> list[Array]:
         """(H,) densities of each fit; those of the same object are the same."""
-        new = list({id(fit): fit for fit in fits if id(fit) not in self._known}.values())
-        scores = self._map(truncated_leave_one_hold_out, new, self._rng.spawn(len(new)))
-        self._known |= {id(fit): (fit, score) for fit, score in zip(new, scores, strict=True)}
+        new = {id(fit): fit for fit in fits if id(fit) not in self._known}
+        scores = self._map(truncated_leave_one_hold_out, list(new.values()), self._rng.spawn(len(new)))
+        for key, score in zip(new, scores, strict=True):
+            self._known[key] = new[key], score
         return [self._known[id(fit)][1] for fit in fits]
 
 
 def _draws(block: LaplaceFit, rng: Generator, n: int) -> tuple[Problem, Array]:
     """The problem with all parameters of a block, and n rough draws of its posterior."""
-    problem, theta, _ = completed(block.target.problem, rough_draws.draws(block.target, block.modes, rng, n), rng)
+    drawn = rough_draws.draws(block.target, block.modes, rng, n)
+    problem, theta, _ = completed(block.target.problem, drawn, rng)
     return problem, theta

@@ -111,7 +111,7 @@ def _lasting_forms(trials: Sequence[Probe]) -> list[list[list[int]]]:
     alike: dict[str, dict[tuple[float, ...], list[int]]] = {}
     for k, probe in enumerate(trials):
         if not isinstance(probe.effect, EventEffect):
-            shape = tuple(probe.own[name] for name in probe.effect.columns()[1:])
+            shape = tuple(probe.own[name] for name in probe.effect.shape_columns)
             alike.setdefault(probe.effect.key, {}).setdefault(shape, []).append(k)
     return [list(shapes.values()) for shapes in alike.values()]
 

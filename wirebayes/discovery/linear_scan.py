@@ -109,9 +109,10 @@ def _rows(point: Point, values: Array, mask: Array) -> Array:
     return np.stack(columns, axis=-1)
 
 
-def _described(trials: Sequence[Probe], m: int) -> tuple[Bools, Ints]:
-    """(m,) whether a signature is one-sided, and (m,) which effect it is of: -1 for those behind the probes'."""
-    one_sided, kinds = np.zeros(m, bool), np.full(m, -1)
+def _described(trials: Sequence[Probe], count: int) -> tuple[Bools, Ints]:
+    """Of so many signatures, whether each is one-sided, and which effect it is of: -1 for those behind the probes'."""
+    one_sided = np.zeros(count, bool)
+    kinds = np.full(count, -1)
     one_sided[: len(trials)] = [trial.one_sided for trial in trials]
     names = list(dict.fromkeys(trial.effect.name for trial in trials))
     kinds[: len(trials)] = [names.index(trial.effect.name) for trial in trials]

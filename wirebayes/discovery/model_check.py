@@ -192,7 +192,7 @@ def write_checks(
     directory: Path,
     seed: int,
     report: Progress,
-    parallel_map: ParallelMap | None = None,
+    parallel_map: ParallelMap | None,
     simulations: int | None = None,
 ) -> None:
     """Check all fits of a command and put the result first in their ``summary.json``, as ``model_check``.
@@ -210,7 +210,7 @@ def write_checks(
         Of the run.
     report : callable
         Called with a name, the number of fits checked and the number to check.
-    parallel_map : callable, optional
+    parallel_map : callable or None
         Takes the place of processes that share the work.
     simulations : int, optional
         As for `check_model`.

@@ -173,11 +173,11 @@ def log_weights(
     return np.array(without), np.array(beside)
 
 
-def _log_prior_in_families(s: EffectSet, kinds: int, families: Sequence[Family]) -> float:
+def _log_prior_in_families(effects: EffectSet, kinds: int, families: Sequence[Family]) -> float:
     """Log weight of a set of so many kinds of effect, shared among the members of its families."""
-    sizes = [len(family_of(name, families)) for name in s.names]
+    sizes = [len(family_of(name, families)) for name in effects.names]
     members = sum(np.log(size) for size in sizes)
-    return float(log_prior(len(s.names), kinds) - members)
+    return float(log_prior(len(effects.names), kinds) - members)
 
 
 def posterior(
@@ -272,35 +272,35 @@ class _Sums:
         """In one material, that each name is the first of those that act."""
         return {name: float(value[block]) for name, value in self.first.items()}
 
-    def add(self, s: EffectSet, without: float, beside: float) -> None:
+    def add(self, effects: EffectSet, without: float, beside: float) -> None:
         """Add a set.
 
         Parameters
         ----------
-        s : EffectSet
+        effects : EffectSet
         without, beside : float
             Its probability without a remainder and with one.
         """
-        idle = self._add_names(s, without + beside)
+        idle = self._add_names(effects, without + beside)
         remains = np.ones(len(self.nothing))
-        if s.remainder is not None:
-            remains = over_subsets(s.remainder)[1]
+        if effects.remainder is not None:
+            remains = over_subsets(effects.remainder)[1]
         with_remainder = beside * remains
         self.remainder[:] += with_remainder
         self.first["unknown"] += with_remainder * idle
         self.nothing[:] += without * idle + beside * (1.0 - remains) * idle
 
-    def _add_names(self, s: EffectSet, whole: float) -> Array:
+    def _add_names(self, effects: EffectSet, whole: float) -> Array:
         """Add the names of a set and their families; (b,) the probability that none of them acts."""
         idle = np.ones(len(self.nothing))  # no effect before acts here
-        for name in s.names:
-            acts = s.presence[name]
+        for name in effects.names:
+            acts = effects.presence[name]
             self.first[name] += whole * idle * acts
             self.inclusion[name] += whole * acts
             idle = idle * (1.0 - acts)
         for family, probability in self.together.items():
-            members = [name for name in s.names if name in family]
-            idle_members = [1.0 - s.presence[name] for name in members]
+            members = [name for name in effects.names if name in family]
+            idle_members = [1.0 - effects.presence[name] for name in members]
             absent = np.prod(idle_members, axis=0)
             probability += whole * (1.0 - absent)
         return idle

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import logsumexp
@@ -12,7 +13,7 @@ from wirebayes.discovery.noise_integral import projected
 from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.refit import LARGEST, Refit, refit
 from wirebayes.discovery.scans import Scan
-from wirebayes.discovery.screening import Candidate, best_probes, log_bayes
+from wirebayes.discovery.screening import Candidate, best_probes, scanned
 from wirebayes.discovery.subsets import over_subsets
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.numeric.typing import Array
@@ -20,10 +21,19 @@ from wirebayes.processes.workers import ParallelMap
 from wirebayes.wire.effect import Effect
 
 _Place = tuple[str, tuple[int, ...]]  # key of the effect, blocks that share its amplitude
-_Task = tuple[Effect, float, float, float, list[Mapping[str, float]]]  # what `refit` is given after the blocks
 _MARGIN, _SHARE = 5.0, 0.5  # linear screening errs, and errs more for a large effect
 _WAVE = 4  # names refitted at once, whatever the number of cores
 _HOPELESS = -2.0  # nats: a block whose scan speaks against an effect is not refitted with it
+
+
+class _Task(NamedTuple):
+    """What `refit` is given after the blocks, in its order."""
+
+    effect: Effect
+    per_delta: float
+    guess: float
+    reach: float
+    shapes: list[Mapping[str, float]]
 
 
 @dataclass(frozen=True)
@@ -60,6 +70,11 @@ class NameEvidence:
     presence: dict[str, Array]
     reach: Mapping[_Place, float] = field(default_factory=dict)
     tried: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def largest(self) -> float:
+        """The largest log Bayes factor of a name that was refitted."""
+        return max((self.log_bayes[name] for name in self.winners), default=-np.inf)
 
     def amplitudes(self, name: str) -> dict[int, Refit]:
         """Refit of a name by block."""
@@ -110,14 +125,11 @@ def weigh_names(
     refitted: dict[str, float] = {}
     while wave := _next_wave(waiting, promise, list(refitted.values()), room):
         waiting = waiting[len(wave) :]
-        promising = []
-        every = []
-        for name in wave:
-            promising += by_name[name][:forms_a_name]
-            every += by_name[name]
+        promising = [form for name in wave for form in by_name[name][:forms_a_name]]
         tasks = _tasks(promising, trials, scans, reach)
         found |= _refits(blocks, tasks, parallel_map)
-        summed = _summed(every, found, len(blocks))
+        every_form = [form for name in wave for form in by_name[name]]
+        summed = _summed(every_form, found, len(blocks))
         refitted |= {name: summed.log_bayes[name] for name in wave}
     result = _summed(forms, found, len(blocks))
     return replace(result, reach=reach, tried={**before, **refitted})
@@ -157,17 +169,22 @@ def _next_wave(
 def _tasks(
     forms: Sequence[_Form], trials: Sequence[Probe], scans: Sequence[Scan], reach: Mapping[_Place, float]
 ) -> dict[_Place, _Task]:
-    """What is refitted of some forms: at each place the effect, the amplitude per δ, a guess, its reach, and shapes."""
+    """What is refitted of some forms, by place."""
     tasks: dict[_Place, _Task] = {}
     for form in forms:
         best = max(form.linear)
         for place, value, candidate in zip(form.places, form.linear, form.candidates, strict=True):
             if not _has_a_chance(value, best):
                 continue
-            _, guess, per_delta = log_bayes(candidate, scans)
+            linear = scanned(candidate, scans)
             chosen = best_probes(candidate, scans)
-            shapes: list[Mapping[str, float]] = [trials[int(number[0])].own for number in chosen]
-            tasks[place] = form.effect, float(per_delta[0]), float(guess[0]), reach.get(place, np.inf), shapes
+            tasks[place] = _Task(
+                form.effect,
+                per_delta=float(linear.per_delta[0]),
+                guess=float(linear.amplitude[0]),
+                reach=reach.get(place, np.inf),
+                shapes=[trials[int(number[0])].own for number in chosen],
+            )
     return tasks
 
 
@@ -201,8 +218,7 @@ def _best_at_each_place(
         if not c.shared:
             continue
         place = trials[c.probe].effect.key, c.blocks
-        evidence, _, _ = log_bayes(c, scans)
-        value = float(evidence[0])
+        value = float(scanned(c, scans).log_bayes[0])
         best.setdefault(place, (-np.inf, c))
         if value > best[place][0]:
             best[place] = value, c

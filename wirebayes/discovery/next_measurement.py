@@ -53,12 +53,14 @@ class MeasurementPlan:
 _SETTINGS = {"displacement": "displacements", "force": "weights"}
 
 
-def other_measurements(p: Protocol, alone: bool, units: Units = NATURAL, settings: str = "") -> list[MeasurementPlan]:
+def other_measurements(
+    protocol: Protocol, alone: bool, units: Units = NATURAL, settings: str = ""
+) -> list[MeasurementPlan]:
     """What could be done with a sample instead.
 
     Parameters
     ----------
-    p : Protocol
+    protocol : Protocol
         What was done with it.
     alone : bool
         Whether there is no other sample, whose displacements would differ.
@@ -67,15 +69,15 @@ def other_measurements(p: Protocol, alone: bool, units: Units = NATURAL, setting
     settings : str
         What is set in all the samples; displacements or weights, as in this one, when left out.
     """
-    settings = settings or _SETTINGS[p.control]
+    settings = settings or _SETTINGS[protocol.control]
     span = f"each sample's {settings}"
     last = ", of every sample"
     if alone:
-        span, last = _ends_in_words(p, units)
-    x = p.setting[p.recorded]
-    times = _longest_series(p)
+        span, last = _ends_in_words(protocol, units)
+    x = protocol.setting[protocol.recorded]
+    times = _longest_series(protocol)
     last_time = times[-1]
-    long = LONGER * (last_time or p.duration_s.max() or 1.0)
+    long = LONGER * (last_time or protocol.duration_s.max() or 1.0)
     spread = np.geomspace(long / 300.0, long, 24)
     log_times = np.concatenate([[0.0], spread])
     held = f"each held {to_be_held(units.time_s * last_time)}"
@@ -85,7 +87,7 @@ def other_measurements(p: Protocol, alone: bool, units: Units = NATURAL, setting
     halved, finer = _halved(x, span, held)
 
     def plan(words: str, holds: Array, moments: Array) -> MeasurementPlan:
-        return MeasurementPlan(words, holds, moments, p.length_mm, p.control)
+        return MeasurementPlan(words, holds, moments, protocol.length_mm, protocol.control)
 
     return [
         plan(
@@ -99,10 +101,10 @@ def other_measurements(p: Protocol, alone: bool, units: Units = NATURAL, setting
     ]
 
 
-def _ends_in_words(p: Protocol, units: Units) -> tuple[str, str]:
+def _ends_in_words(protocol: Protocol, units: Units) -> tuple[str, str]:
     """What is set from the least to the largest, and the way back."""
-    unit = SET_UNIT[p.control]
-    set_in_test = units.of(unit) * p.setting[p.recorded]
+    unit = SET_UNIT[protocol.control]
+    set_in_test = units.of(unit) * protocol.setting[protocol.recorded]
     low = short(set_in_test.min())
     high = short(set_in_test.max())
     span = low if low == high else f"{low} to {high}"
@@ -120,10 +122,10 @@ def _halved(x: Array, span: str, held: str) -> tuple[Array, str]:
 LONGER = 5.0  # times the longest series: holds in which slow and fast creep part
 
 
-def _longest_series(p: Protocol) -> Array:
+def _longest_series(protocol: Protocol) -> Array:
     """Reading times of the hold with most readings."""
-    counts = p.mask.sum(axis=1)
-    return p.time_s[int(np.argmax(counts))][: int(counts.max())]
+    counts = protocol.mask.sum(axis=1)
+    return protocol.time_s[int(np.argmax(counts))][: int(counts.max())]
 
 
 def _holds(setting: Array, times: Array, length_mm: float, control: Control) -> Protocol:

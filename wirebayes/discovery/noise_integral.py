@@ -257,17 +257,17 @@ def _bordered(square: Array, along: Array) -> Array:
     share = SIZES**2 / np.maximum(whole, 1e-300)
     out = np.zeros((*share.shape, q + 1, q + 1))
     out[..., :q, :q] = share[..., None, None] * square[..., None, :, :]
-    _add_to_diagonals(out, 1.0)
+    _add_identity(out)
     out[..., q, :q] = np.sqrt(share)[..., None] * along[..., None, :]
     out[..., q, q] = LARGEST_SLOPE
     return out
 
 
-def _add_to_diagonals(matrices: Array, value: float) -> None:
-    """Add a number to all diagonals (..., q, q), in place."""
+def _add_identity(matrices: Array) -> None:
+    """Add one to all diagonals (..., q, q), in place."""
     q = matrices.shape[-1]
     flat = matrices.reshape(-1, q * q)
-    flat[:, :: q + 1] += value
+    flat[:, :: q + 1] += 1.0
 
 
 def has_tangent(x: Expansion) -> Bools:

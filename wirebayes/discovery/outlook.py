@@ -7,7 +7,7 @@ import numpy as np
 from wirebayes.discovery import next_measurement, power
 from wirebayes.discovery.global_test import Gate
 from wirebayes.discovery.material_answer import MaterialAnswer
-from wirebayes.discovery.power import Cosines
+from wirebayes.discovery.power import Cosines, Detectable
 from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.settings import Settings
 from wirebayes.inference.laplace_fit import LaplaceFit
@@ -34,11 +34,11 @@ def outlook(gate: Gate, i: int, settings: Settings, answer: MaterialAnswer, alik
     trials = gate.trials
     found = power.detectable(gate.nulls[i], trials, gate.candidates, gate.test, i)
     seen: dict[str, DetectableAmplitude] = {}
-    for name, (trial, amplitude) in found.items():
-        seen[name] = _detectable(block, trials[trial].effect, amplitude)
+    for name, smallest in found.items():
+        seen[name] = _detectable(block, trials[smallest.trial].effect, smallest.amplitude)
     possible = [candidate.name for candidate in gate.candidates if i in candidate.blocks]
     hidden = power.not_identifiable(block, list(settings.kinds.values()), possible)
-    rivals = [trials[found[name][0]] for name in _rivals(answer, alike) if name in found]
+    rivals = [trials[found[name].trial] for name in _rivals(answer, alike) if name in found]
     proposal = _proposal(block, answer, rivals, found, trials)
     return {"power": seen, "not_identifiable": hidden, "next_measurement": proposal}
 
@@ -55,13 +55,14 @@ def _proposal(
     block: LaplaceFit,
     answer: MaterialAnswer,
     rivals: Sequence[Probe],
-    found: Mapping[str, tuple[int, float | None]],
+    found: Mapping[str, Detectable],
     trials: Sequence[Probe],
 ) -> str:
     """What to measure next: what tells two rivals apart, shows the only one better, or the effect that hides best."""
     pair = (rivals[0], rivals[1]) if len(rivals) > 1 else None
     if answer.remains:
-        of_remainder = next_measurement.next_for_remainder(answer.stages[-1] if answer.stages else block)
+        final = answer.stages[-1] if answer.stages else block
+        of_remainder = next_measurement.next_for_remainder(final)
         if answer.judgement.undecided and pair is not None:
             return f"{next_measurement.next_measurement(block, pair, None)} {of_remainder}"
         return of_remainder
@@ -71,14 +72,19 @@ def _proposal(
     return next_measurement.next_measurement(block, pair, weakest)
 
 
-def _best_hidden(found: Mapping[str, tuple[int, float | None]], trials: Sequence[Probe]) -> Probe | None:
+def _best_hidden(found: Mapping[str, Detectable], trials: Sequence[Probe]) -> Probe | None:
     """The effect whose detectable amplitude is largest beside what a person expects before the test."""
 
-    def hiddenness(name: str) -> float:
-        probe, amplitude = found[name]
-        return np.inf if amplitude is None else amplitude / finite_spread(trials[probe].effect.amplitudes[0].prior)
+    def hiddenness(smallest: Detectable) -> float:
+        if smallest.amplitude is None:
+            return np.inf
+        prior = trials[smallest.trial].effect.amplitudes[0].prior
+        return smallest.amplitude / finite_spread(prior)
 
-    return trials[found[max(found, key=hiddenness)][0]] if found else None
+    if not found:
+        return None
+    most_hidden = max(found.values(), key=hiddenness)
+    return trials[most_hidden.trial]
 
 
 def _detectable(block: LaplaceFit, effect: Effect, amplitude: float | None) -> DetectableAmplitude:

@@ -22,9 +22,22 @@ _PIECE = 64  # rows weighed at once: what stays in the cache
 
 @dataclass(frozen=True)
 class Weighed:
-    """At one place: log marginal density, best move of the amplitude, δ per amplitude, step of the parameters, ρ.
+    """What the readings say at n places, with the noise integrated out.
 
-    And by how much the density would grow with that step, were the tangent exact.
+    Attributes
+    ----------
+    height : (n,) array
+        Log marginal density.
+    move : (n,) array
+        The best move of the amplitude.
+    norm : (n,) array
+        δ per amplitude.
+    step : (n, p) array
+        Of the parameters, by Gauss and Newton.
+    ratio : (n,) array
+        ρ, the size of the setting errors against the sensor's, that suits best.
+    promise : (n,) array
+        By how much the log density would grow with that step, were the tangent exact.
     """
 
     height: Array
@@ -97,7 +110,7 @@ class _Free:
     @property
     def residual(self) -> Array:
         """(n, k) of the residual with itself. Nothing is taken off it: far out, steps promise more than they keep."""
-        return np.asarray(self.gram[..., -1, -1])
+        return self.gram[..., -1, -1]
 
     def left(self, amplitude: Array, least: Array) -> Array:
         """(n, k) sum of squares beside amplitudes (n, k); no less than rounding (n,)."""
@@ -155,7 +168,7 @@ def _inner_products(x: Tangent, columns: Array) -> Array:
     plain = np.swapaxes(columns, 1, 2) @ columns
     plain[:, :p, :p] += x.prior_precision
     plain[:, -1, :p] += x.prior_gradient
-    return np.asarray(plain[:, None] - whole_holds.reshape(n, len(RATIOS), *plain.shape[1:]))
+    return plain[:, None] - whole_holds.reshape(n, len(RATIOS), *plain.shape[1:])
 
 
 def _eliminated(gram: Array) -> _Free:

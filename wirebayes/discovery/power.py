@@ -1,6 +1,7 @@
 """Detectable amplitudes, similar effects, and what this protocol cannot show."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,31 @@ from wirebayes.wire.protocol import Control
 Cosines = dict[tuple[str, str], float]  # of the angles between the signatures of two effects, without sign
 FARTHEST = 3.0  # times the largest probe, which is three standard deviations of the prior: nobody expects so much
 ALIKE = 0.95  # |cos| from which names form a group: an effect of δ = 10 then differs from its twin by δ = 3 only
+
+
+class Rung(NamedTuple):
+    """A probe of an effect, one of several at rising amplitudes.
+
+    Attributes
+    ----------
+    amplitude : float
+        At which the probe's signature was taken.
+    trial : int
+        The probe's number.
+    seen : float or None
+        The amplitude that would be seen if the signature stayed as it is.
+    """
+
+    amplitude: float
+    trial: int
+    seen: float | None
+
+
+class Detectable(NamedTuple):
+    """Number of the probe by which an effect is seen, and from which amplitude on; None where it is not."""
+
+    trial: int
+    amplitude: float | None
 
 
 def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | None:
@@ -60,7 +86,7 @@ def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | 
 
 def detectable(
     null: Scan, trials: Sequence[Probe], candidates: Sequence[Candidate], level: GlobalTest, block: int = 0
-) -> dict[str, tuple[int, float | None]]:
+) -> dict[str, Detectable]:
     """For each effect that a block can show, a probe and the amplitude that is detected in 80 % of tests, if any is.
 
     The parameters bend themselves to some effects as long as these are small. A signature holds about the amplitude at
@@ -81,11 +107,12 @@ def detectable(
     for name, ladder in _strongest(null, trials, here).items():
         threshold = level.threshold(name, ALPHA)
         rungs = []
-        for step, k in sorted(ladder.items()):
+        for amplitude, k in sorted(ladder.items()):
             seen = amplitude_80(null, trials[k], k, threshold)
-            rungs.append((step, k, seen))
-        k, seen = smallest_seen(rungs)
-        found[name] = k, _possible(trials[k].effect.amplitudes[0], seen)
+            rungs.append(Rung(amplitude, k, seen))
+        smallest = smallest_seen(rungs)
+        main = trials[smallest.trial].effect.amplitudes[0]
+        found[name] = Detectable(smallest.trial, _possible(main, smallest.amplitude))
     return found
 
 
@@ -109,31 +136,31 @@ def _strongest(null: Scan, trials: Sequence[Probe], candidates: Sequence[Candida
     return best
 
 
-def smallest_seen(rungs: Sequence[tuple[float, int, float | None]]) -> tuple[int, float | None]:
+def smallest_seen(rungs: Sequence[Rung]) -> Detectable:
     """The probe and the amplitude at which an effect begins to be seen, by probes at rising amplitudes.
 
     It lies below the first probe whose own amplitude would be seen and above the one before; between the two, how
     strongly it shows is taken to follow a power of the amplitude. Beyond the last probe that power goes on, up to
     `FARTHEST`: a delay of the first reading can take no more than what relaxes in a hold.
-
-    Parameters
-    ----------
-    rungs : sequence of (float, int, float or None)
-        Of each probe its amplitude, its number, and the amplitude that would be seen if the signature stayed as it is.
     """
-    below: tuple[float, float | None] | None = None
-    for step, k, seen in rungs:
-        if seen is not None and seen <= step:
-            if below is None:
-                return k, seen
-            amplitude, needed = below
-            return k, step if needed is None else _by_power((amplitude, needed), (step, seen))
-        below = (step, seen)
-    _, k, _ = rungs[-1]
-    return k, _beyond(rungs)
+    below = None
+    for rung in rungs:
+        if rung.seen is not None and rung.seen <= rung.amplitude:
+            return Detectable(rung.trial, _between(below, rung.amplitude, rung.seen))
+        below = rung
+    return Detectable(rungs[-1].trial, _beyond(rungs))
 
 
-def _beyond(rungs: Sequence[tuple[float, int, float | None]]) -> float | None:
+def _between(below: Rung | None, amplitude: float, seen: float) -> float:
+    """The smallest amplitude that is seen, by the first probe whose own amplitude is, and the one below it."""
+    if below is None:
+        return seen
+    if below.seen is None:
+        return amplitude
+    return _by_power((below.amplitude, below.seen), (amplitude, seen))
+
+
+def _beyond(rungs: Sequence[Rung]) -> float | None:
     """Where the share of what is needed to be seen passes one beyond the last probe; None where it does not, or far."""
     last, _, seen = rungs[-1]
     if seen is None or len(rungs) == 1:  # a form that is linear has one probe
@@ -156,7 +183,8 @@ def _by_power(first: tuple[float, float], second: tuple[float, float]) -> float:
     first, second : (float, float)
         Of two probes the amplitude, and the amplitude that would be seen; that share is one over the other.
     """
-    (low, needed_at_low), (high, needed_at_high) = first, second
+    low, needed_at_low = first
+    high, needed_at_high = second
     missing = np.log(needed_at_low / low)
     gained = missing + np.log(high / needed_at_high)
     return float(low * (high / low) ** (missing / gained))
@@ -183,9 +211,10 @@ def similarity(expansions: Sequence[Expansion], trials: Sequence[Probe], ratios:
     cosines = _cosines(expansions, trials, ratios)
     names = [t.effect.name for t in trials]
     out: Cosines = {}
-    for i, a in enumerate(names):
-        for j, b in enumerate(names):
-            out[a, b] = max(out.get((a, b), 0.0), float(cosines[i, j]))
+    for i, one in enumerate(names):
+        for j, other in enumerate(names):
+            largest = out.get((one, other), 0.0)
+            out[one, other] = max(largest, float(cosines[i, j]))
     return out
 
 
@@ -220,8 +249,8 @@ def cosines(parts: Sequence[Array], has_own: Array) -> Array:
 
 def group_of(members: Sequence[str], alike: Cosines) -> list[str]:
     """The members and every effect whose signature is as good as one of theirs."""
-    names = dict.fromkeys([*members, *(b for (a, b), cos in alike.items() if a in members and cos > ALIKE)])
-    return list(names)
+    others = [other for (one, other), cosine in alike.items() if one in members and cosine > ALIKE]
+    return list(dict.fromkeys([*members, *others]))
 
 
 _ANY = Normal(0.0, 0.1)  # the prior of a probe, of which only the signature is used
@@ -312,7 +341,7 @@ def _absorbed(block: LaplaceFit, control: Control, known: Sequence[type[Effect]]
     for kind in _ABSORBABLE:
         if kind not in known:
             effect = kind().under(control)
-            trials.append(Probe(effect, {effect.columns()[0]: 1e-3}, 1e-3, False))
+            trials.append(Probe(effect, {effect.amplitude_column: 1e-3}, 1e-3, False))
     x = expand(block.target, block.z, trials)
     wholes = _lengths(x.signatures[0])
     rests = _lengths(projected(x, 0.0))

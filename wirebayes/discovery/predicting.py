@@ -77,10 +77,10 @@ class Predicting:
     def _is_fitted(self, key: Key) -> bool:
         return not key or key in self.explored.fitted
 
-    def _is_outpredicted(self, s: EffectSet, weight: float, found: ModelPosterior) -> bool:
+    def _is_outpredicted(self, effects: EffectSet, weight: float, found: ModelPosterior) -> bool:
         larger = {}
         for other, own in zip(found.sets, found.without.tolist(), strict=True):
-            if other.key > s.key and len(other.key) > 1:
+            if other.key > effects.key and len(other.key) > 1:
                 larger[other.key] = own
         least = np.exp(-REACH) * weight
         if sum(larger.values()) < least:
@@ -88,10 +88,10 @@ class Predicting:
         best = self._best_predicting(larger, found)
         if best is None:
             return False
-        by_remainder = self._gain_of_remainder(s.key)
+        by_remainder = self._gain_of_remainder(effects.key)
         if by_remainder is None:
             return False
-        by_names = self._elpd(best) - self._elpd(s.key)
+        by_names = self._elpd(best) - self._elpd(effects.key)
         return by_names > by_remainder + KEEP_ELPD
 
     def _best_predicting(self, weights: Mapping[Key, float], found: ModelPosterior) -> Key | None:

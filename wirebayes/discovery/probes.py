@@ -37,7 +37,7 @@ class Probe:
 
 def probes(effect: Effect) -> list[Probe]:
     """Amplitudes at which an effect is tried: one where its form is nearly linear, a ladder where it need not be."""
-    column = effect.columns()[0]
+    column = effect.amplitude_column
     amplitude = effect.amplitudes[0]
     neutral = amplitude.neutral
     low, high = amplitude.prior.support()

@@ -121,7 +121,7 @@ def _about_best(profile: Profile) -> Bools:
     least = profile.value[best] - _NEAR_TOP
     near = (profile.value > least) & np.isfinite(profile.value)
     near[best - 1 : best + 2] = True
-    return np.asarray(near)
+    return near
 
 
 def integral_of(profile: Profile, neutral: float, per_delta: float) -> tuple[float, float]:

@@ -329,7 +329,7 @@ def _about_top(profile: Profile) -> Array:
     if not bend < 0:
         return np.empty(0)
     top = grid[best] - 0.5 * slope / bend
-    return np.asarray(top + _ABOUT_TOP / np.sqrt(-2.0 * bend))
+    return top + _ABOUT_TOP / np.sqrt(-2.0 * bend)
 
 
 def _summary(effect: Effect, which: Sequence[int], amplitude: _Amplitude, profile: Profile) -> Refit:

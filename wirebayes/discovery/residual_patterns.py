@@ -8,6 +8,7 @@ import numpy as np
 from wirebayes.discovery.linear_scan import AddedColumns
 from wirebayes.discovery.scans import Scan
 from wirebayes.json_files.discovery import Disagreement
+from wirebayes.model.column_units import parameter_of
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import NOISES, Sample
 from wirebayes.numeric.typing import Array
@@ -18,15 +19,17 @@ from wirebayes.wire.protocol import Control
 _PARAMETERS = {"k1": "the stiffness k1", "B": "the creep amount B", "k2": "the creep rate k2"}
 
 
-def _warming(s: Sample) -> Array:
-    return np.zeros(s.protocol.time_s.shape) if s.protocol.warming_K is None else s.protocol.warming_K
+def _warming(sample: Sample) -> Array:
+    protocol = sample.protocol
+    return np.zeros(protocol.time_s.shape) if protocol.warming_K is None else protocol.warming_K
 
 
 def _of(what: Control) -> Callable[[Sample], Array]:
     """Displacements or tensions: what is set in a test is noted once a hold, the other was read."""
 
-    def values(s: Sample) -> Array:
-        return s.protocol.setting[:, None] if s.protocol.control == what else s.readings[..., 0]
+    def values(sample: Sample) -> Array:
+        protocol = sample.protocol
+        return protocol.setting[:, None] if protocol.control == what else sample.readings[..., 0]
 
     return values
 
@@ -101,7 +104,7 @@ def patterns(problem: Problem) -> tuple[list[Pattern], AddedColumns]:
 
 def _moving_parameters(problem: Problem) -> dict[str, int]:
     """The parameters that may move along a covariate, and the number of each among those that move the mean."""
-    kinds = [name.split("[")[0] for name in problem.names]
+    kinds = [parameter_of(name) for name in problem.names]
     moving = [kind for kind in kinds if kind not in NOISES]
     return {name: moving.index(name) for name in _PARAMETERS if name in moving}
 
@@ -208,15 +211,16 @@ def findings(listed: Sequence[Pattern], skip: int, data: Scan, null: Scan, names
     columns_of: dict[str, list[int]] = {}
     for column, pattern in enumerate(listed, start=skip):
         columns_of.setdefault(pattern.covariate, []).append(column)
+    simulations = len(null.effects)
     out: list[Disagreement] = []
     for covariate, columns in columns_of.items():
         evidence = data.effects[0, columns]
         best = columns[int(np.argmax(evidence))]
-        pattern = listed[best - skip]
+        best_pattern = listed[best - skip]
         p = _p_value(columns, data, null)
-        said = _sentence(pattern, float(data.amplitude[0, best]), p)
-        sentence = f"{names}: {said} ({p_in_words(p, len(null.effects))})."
-        out.append({"covariate": covariate, "hold": pattern.hold, "p": p, "sentence": sentence})
+        said = _sentence(best_pattern, float(data.amplitude[0, best]), p)
+        sentence = f"{names}: {said} ({p_in_words(p, simulations)})."
+        out.append({"covariate": covariate, "hold": best_pattern.hold, "p": p, "sentence": sentence})
     return sorted(out, key=lambda item: item["p"])
 
 

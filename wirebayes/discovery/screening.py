@@ -6,7 +6,7 @@ an event one at its hold of its experiment: the scope decides on which blocks a 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import betaincinv
@@ -141,8 +141,16 @@ def _of_the_bench(kind: type[Effect], block: LaplaceFit, tests: Sequence[Protoco
     return out
 
 
-def log_bayes(candidate: Candidate, scans: Sequence[Scan]) -> tuple[Array, Array, Array]:
-    """(n,) log Bayes factor with the same prior on every amplitude, best amplitude, and amplitude per δ."""
+class Scanned(NamedTuple):
+    """A candidate in n data sets, (n,) each: log Bayes factor, best amplitude, and amplitude per δ."""
+
+    log_bayes: Array
+    amplitude: Array
+    per_delta: Array
+
+
+def scanned(candidate: Candidate, scans: Sequence[Scan]) -> Scanned:
+    """What a scan says of a candidate, with the same prior on every amplitude."""
     blocks = candidate.blocks
     one_sided = bool(scans[blocks[0]].pieces.one_sided[candidate.probe])
     prior = occam(one_sided)
@@ -152,11 +160,11 @@ def log_bayes(candidate: Candidate, scans: Sequence[Scan]) -> tuple[Array, Array
     if not candidate.shared or len(blocks) == 1:
         value = log_ratio.sum(axis=0) + prior * len(blocks)
         per_delta = 1.0 / np.maximum(norm[0], 1e-300)
-        return value, amplitude[0], per_delta
+        return Scanned(value, amplitude[0], per_delta)
     value, mean = shared_amplitude(log_ratio, amplitude, norm)
     square = (norm**2).sum(axis=0)
     together = np.sqrt(np.maximum(square, 1e-300))
-    return value + prior, mean, 1.0 / together
+    return Scanned(value + prior, mean, 1.0 / together)
 
 
 def _in_each_block(candidate: Candidate, scans: Sequence[Scan]) -> tuple[Array, Array, Array]:
@@ -182,25 +190,26 @@ def _each(values: Array, columns: Ints) -> Array:
     return values[np.arange(len(columns)), columns]
 
 
-def shared_amplitude(lr: Array, a: Array, norm: Array) -> tuple[Array, Array]:
+def shared_amplitude(log_ratio: Array, amplitude: Array, norm: Array) -> tuple[Array, Array]:
     """One amplitude for several blocks: its log likelihood ratio, and the amplitude itself.
 
     Each block's log likelihood ratio is a parabola through zero amplitude and through its own best.
 
     Parameters
     ----------
-    lr : (b, ...) array
+    log_ratio : (b, ...) array
         Log likelihood ratio of each block at its own best amplitude.
-    a : (b, ...) array
+    amplitude : (b, ...) array
         That amplitude.
     norm : (b, ...) array
         δ per amplitude, the curvature where the best amplitude is too small to say.
     """
     with np.errstate(all="ignore"):
-        weight = np.where(np.abs(a) * norm > 0.5, 2.0 * lr / a**2, norm**2)
+        weight = np.where(np.abs(amplitude) * norm > 0.5, 2.0 * log_ratio / amplitude**2, norm**2)
         total = np.maximum(weight.sum(axis=0), 1e-300)
-        mean = (weight * a).sum(axis=0) / total
-        value = (lr - 0.5 * weight * (a - mean) ** 2).sum(axis=0)
+        mean = (weight * amplitude).sum(axis=0) / total
+        lost = 0.5 * weight * (amplitude - mean) ** 2
+        value = (log_ratio - lost).sum(axis=0)
     return or_impossible(value), mean
 
 
@@ -236,8 +245,8 @@ def replicated(
     y = [replicate(problem, theta, s, rng) for s in problem.samples]
     density, residuals = target.rowwise(y)
     found = climb(density, z, residuals, iterations=25, tolerance=1e-2, curvature_at_end=False)
-    scanned = _scanned_in_parts(block, trials, found.z, y, columns)
-    return Replicates(scanned, found.z, y)
+    of_replicates = _scanned_in_parts(block, trials, found.z, y, columns)
+    return Replicates(of_replicates, found.z, y)
 
 
 def _scanned_in_parts(block: LaplaceFit, trials: Sequence[Probe], z: Array, y: Sequence[Array], columns: Any) -> Scan:
@@ -260,8 +269,11 @@ def joined_replicates(parts: Sequence[Replicates]) -> Replicates:
     """Several lots of replicates of one block as one."""
     if len(parts) == 1:
         return parts[0]
-    readings = [np.concatenate(y, axis=-1) for y in zip(*(p.readings for p in parts), strict=True)]
-    return Replicates(joined([p.scan for p in parts]), np.concatenate([p.z for p in parts]), readings)
+    scans = joined([p.scan for p in parts])
+    z = np.concatenate([p.z for p in parts])
+    of_samples = zip(*(p.readings for p in parts), strict=True)
+    readings = [np.concatenate(of_sample, axis=-1) for of_sample in of_samples]
+    return Replicates(scans, z, readings)
 
 
 def by_name(candidates: Sequence[Candidate], scans: Sequence[Scan]) -> dict[str, Array]:
@@ -273,7 +285,8 @@ def by_name(candidates: Sequence[Candidate], scans: Sequence[Scan]) -> dict[str,
     two = _alone_and_together([s.two for s in scans])
     out = {_FLEXIBLE: np.maximum(flexible, _AGAINST), TWO: np.maximum(two, _AGAINST)}
     for c in candidates:
-        out[c.name] = np.maximum(out.get(c.name, _AGAINST), log_bayes(c, scans)[0])
+        before = out.get(c.name, _AGAINST)
+        out[c.name] = np.maximum(before, scanned(c, scans).log_bayes)
     return out
 
 
@@ -310,7 +323,8 @@ class Scale:
         """The scale of simulated values; where there are few, the fall is nearly one nat, as for many readings."""
         high = float(np.quantile(chance, 1.0 - UPPER))
         beyond = chance[chance > high] - high
-        return Scale(high, float((beyond.sum() + ONE_NAT) / (len(beyond) + ONE_NAT)), chance)
+        fall = (beyond.sum() + ONE_NAT) / (len(beyond) + ONE_NAT)
+        return Scale(high, float(fall), chance)
 
     def surprise(self, value: Any) -> Any:
         """How surprising a value is, or each value of an array; not at all where the evidence is against the name."""
@@ -322,8 +336,11 @@ class Scale:
         """The least value that is so surprising."""
         along = self.high + self.fall * float(surprise + np.log(UPPER))
         beyond = surprise - ABOVE_COUNT - float(np.log1p(len(self.chance)))  # the largest simulated value
-        share = min(1.0, np.exp(ABOVE_COUNT - surprise))
-        least = self.chance.max() + beyond if beyond > 0 else np.quantile(self.chance, 1.0 - share)
+        if beyond > 0:
+            least = self.chance.max() + beyond
+        else:
+            share = min(1.0, np.exp(ABOVE_COUNT - surprise))
+            least = np.quantile(self.chance, 1.0 - share)
         return max(along, float(least))
 
 
@@ -396,5 +413,7 @@ def global_test(candidates: Sequence[Candidate], data: Sequence[Scan], null: Seq
     GlobalTest
     """
     level = chance_level(candidates, null)
-    found = {name: float(level.scales[name].surprise(v[0])) for name, v in by_name(candidates, data).items()}
+    found = {}
+    for name, value in by_name(candidates, data).items():
+        found[name] = float(level.scales[name].surprise(value[0]))
     return replace(level, surprises=found)

@@ -193,9 +193,9 @@ def _own_reports(
     return reports
 
 
-def _few_holds(e: Experiment) -> list[Notice]:
+def _few_holds(experiment: Experiment) -> list[Notice]:
     """What a test of few holds leaves open: nothing is left out, so nothing shows whether an effect predicts."""
-    holds = len(e.recorded_holds)
+    holds = len(experiment.recorded_holds)
     if holds >= LEAST_HOLDS:
         return []
     text = (
@@ -247,7 +247,7 @@ def _inclusion(found: Evidence | None) -> dict[str, float]:
 def _common(
     answers: Sequence[MaterialAnswer],
     i: int,
-    e: Experiment,
+    experiment: Experiment,
     plain: list[LaplaceFit],
     test: GlobalTest,
     where: list[Disagreement],
@@ -263,7 +263,7 @@ def _common(
         "set": answer.set,
         "group": _group(answer.set, alike),
         "accepted": names,
-        "amplitudes": _amplitudes(answer, i, e),
+        "amplitudes": _amplitudes(answer, i, experiment),
         "probabilities": answer.shares,
         "probability_nothing": None if answer.found is None else answer.found.nothing,
         "inclusion": _inclusion(answer.found),
@@ -287,12 +287,12 @@ def _group(members: Sequence[str], alike: Cosines) -> list[str]:
     return group
 
 
-def _amplitudes(answer: MaterialAnswer, i: int, e: Experiment) -> dict[str, AmplitudeEstimate]:
+def _amplitudes(answer: MaterialAnswer, i: int, experiment: Experiment) -> dict[str, AmplitudeEstimate]:
     """The amplitudes of each effect in the final model of material `i` that acts on an experiment."""
     out = {}
     for accepted in answer.accepted:
         effect = accepted.effects[i]
-        if effect.acts_on(e.name, e.control):
+        if effect.acts_on(experiment.name, experiment.control):
             out[accepted.name] = _amplitude(answer.stages[-1], effect)
     return out
 

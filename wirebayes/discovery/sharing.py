@@ -39,7 +39,7 @@ def informed(blocks: Sequence[LaplaceFit], effects: Mapping[int, Effect], rng: n
 def _priors(effect: Effect, others: Sequence[tuple[LaplaceFit, Effect]]) -> dict[str, dict[str, Any]]:
     """What other blocks know of the parameters of an effect that they share."""
     priors = {}
-    for column in (effect.columns()[0], *effect.common_shapes()):
+    for column in (effect.amplitude_column, *effect.common_shapes()):
         table = _told(others, column)
         if table is not None:
             priors[column] = table
@@ -98,4 +98,4 @@ def alike(means: Array, sds: Array, log_prior: Function) -> Array:
     apart = (weight * (means - middle) ** 2).sum(axis=0)
     others = len(means) - 1
     overlap = 0.5 * (np.log(weight).sum(axis=0) - np.log(together) - others * np.log(2.0 * np.pi) - apart)
-    return np.asarray(overlap - others * log_prior(middle))
+    return overlap - others * log_prior(middle)

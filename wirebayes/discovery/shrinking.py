@@ -186,7 +186,8 @@ def _beside_discrepancy(
     fitting = []
     for base, of_base, own in zip(bases, added, generators, strict=True):
         effects = list(of_base)
-        of_whole, of_first = effects[: len(train)], effects[len(train) :]
+        of_whole = effects[: len(train)]
+        of_first = effects[len(train) :]
         fits = _each_fitted(base, of_whole, own, parallel_map)
         fitting.append((fits, _each_trained(base, train, of_first)))
     return [_Smooth(list(fits), trained) for fits, trained in fitting]
@@ -234,9 +235,14 @@ def _gain(elpd: Sequence[Array], named: int, n: int, remains: bool) -> _Gain:
     smooth = np.concatenate(others[:n])
     final = np.concatenate(elpd[-n:]) if remains else elpd[1]
     difference = final - plain
-    spread = float(difference.std(ddof=1) * np.sqrt(len(difference)))
+    spread = _sd_of_sum(difference)
     by_smooth = float((smooth - plain).sum())
     return _Gain(float(difference.sum()), spread, by_smooth)
+
+
+def _sd_of_sum(values: Array) -> float:
+    """Standard error of a sum, by how values (m,) differ from each other."""
+    return float(values.std(ddof=1) * np.sqrt(len(values)))
 
 
 def discrepancy_gain(
@@ -262,9 +268,9 @@ def discrepancy_gain(
     if any(len(e.recorded_holds) < LEAST_HOLDS for e in base.experiments):
         return None
     n = len(base.experiments)
-    added = parallel_map(with_discrepancy, repeat(base), base.experiments, rng.spawn(n))
-    alone_ = [(e,) for e in base.experiments]
-    beside = list(parallel_map(fitted, alone_, list(added), repeat(base.spec), rng.spawn(n)))
+    added = list(parallel_map(with_discrepancy, repeat(base), base.experiments, rng.spawn(n)))
+    singly = [(e,) for e in base.experiments]
+    beside = parallel_map(fitted, singly, added, repeat(base.spec), rng.spawn(n))
     before, *after = (float(v.sum()) for v in left_out.of([base, *beside]))
     return sum(after) - before
 
@@ -273,10 +279,10 @@ def _compared(
     plain: held_out.HeldOut, final: held_out.HeldOut, flexible: held_out.HeldOut | None, gain: _Gain | None
 ) -> HeldOutJson:
     """What the report says of the held-out holds of one experiment."""
-    d = final.elpd - plain.elpd
+    difference = final.elpd - plain.elpd
     spread = None
-    if len(d) > 1:
-        spread = float(d.std(ddof=1) * np.sqrt(len(d)))
+    if len(difference) > 1:
+        spread = _sd_of_sum(difference)
     return {
         "holds": plain.holds,
         "plain": _score(plain),
@@ -306,8 +312,11 @@ def with_discrepancy(block: LaplaceFit, experiment: Experiment, rng: Generator) 
     own = acting_alone(block.effects, experiment)
     # two experiments of one name differ in how many of its holds they have
     same = block.names == (experiment.name,) and len(block.experiments[0].holds) == len(experiment.holds)
-    fit = block if same and own == block.effects else fitted([experiment], own, block.spec, rng, scales=block.scales)
-    return (*own, discrepancy(experiment, residual_rms(fit, experiment.name)))
+    fit = block
+    if not same or own != block.effects:
+        fit = fitted([experiment], own, block.spec, rng, scales=block.scales)
+    size_N = residual_rms(fit, experiment.name)
+    return (*own, discrepancy(experiment, size_N))
 
 
 def acting_alone(effects: Sequence[Effect], experiment: Experiment) -> tuple[Effect, ...]:
@@ -324,10 +333,12 @@ def discrepancy(experiment: Experiment, size_N: float) -> Discrepancy:
 
 def residual_rms(block: LaplaceFit, name: str) -> float:
     """Root mean square of what the best parameters leave over in an experiment's readings, N."""
-    sample = block.target.problem.samples[block.names.index(name)]
-    line, _ = block.target.problem.linearised(block.theta, sample)
-    left = float(np.sqrt((((sample.readings - line.reading)[sample.protocol.mask]) ** 2).mean()))
-    return left * block.target.problem.read_unit(sample)
+    problem = block.target.problem
+    sample = problem.samples[block.names.index(name)]
+    line, _ = problem.linearised(block.theta, sample)
+    left = (sample.readings - line.reading)[sample.protocol.mask]
+    rms = float(np.sqrt((left**2).mean()))
+    return rms * problem.read_unit(sample)
 
 
 def _score(held: held_out.HeldOut) -> ScoresJson:

@@ -40,7 +40,7 @@ def beside_smooth(x: Expansion) -> Array:
 
 
 class _Products(NamedTuple):
-    """The inner products of `Projected`, at k ratios and s sizes of a remainder that is in the model."""
+    """The inner products of `Projected`, with a remainder in the model: at k ratios ρ and s sizes of it."""
 
     shared: Array
     rss: Array

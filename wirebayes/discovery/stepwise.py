@@ -79,11 +79,12 @@ def explore(
     _add_singles(frontier, root, found, _credits(expansions, trials))
     frontier.lead_to(_leading_pair(expansions, trials))
     fit = partial(_fit, families=families, references=references, settings=settings)
+    without = _log_evidence(plain)
     while wave := frontier.next_looks(_looks(len(frontier.fitted))):
         parents, names = frontier.origins(wave, start)
         fitted_sets = parallel_map(fit, parents, names, rng.spawn(len(wave)))
         for key, new in zip(wave, fitted_sets, strict=True):
-            own_fit = _log_evidence(new.blocks) - _log_evidence(plain)
+            own_fit = _log_evidence(new.blocks) - without
             _keep(frontier, key, new, own_fit)
     sets = root, *frontier.known.values()
     return Explored(sets, frontier.fitted, _left_over(frontier), frontier.parents, start)
@@ -147,9 +148,8 @@ def _left_over(frontier: Frontier) -> dict[Key, float]:
         further = fitted_set.further
         if further is None or not further.winners:
             continue
-        best = max(further.log_bayes[name] for name in further.winners)
         one_more = log_prior(len(key) + 1, frontier.names) - log_prior(len(key), frontier.names)
-        out[key] = log_weight + one_more + min(best, LEFT_OVER)
+        out[key] = log_weight + one_more + min(further.largest, LEFT_OVER)
     return out
 
 
@@ -158,8 +158,9 @@ def _credits(expansions: Sequence[Expansion], trials: Sequence[Probe]) -> dict[s
     out: dict[str, Array] = {}
     values = np.array([beside_smooth(x)[: len(trials)] for x in expansions])
     for k, probe in enumerate(trials):
-        here = values[:, k] + occam(probe.one_sided)
-        out[probe.effect.name] = np.maximum(out.get(probe.effect.name, -np.inf), here)
+        name = probe.effect.name
+        before = out.get(name, -np.inf)
+        out[name] = np.maximum(before, values[:, k] + occam(probe.one_sided))
     return out
 
 
@@ -224,12 +225,11 @@ def _further(
         most=MOST_BESIDE,
         forms_a_name=1,
     )
-    best = max((further.log_bayes[n] for n in further.winners), default=-np.inf)
-    return further if best >= WORTH_ADDING else None
+    return further if further.largest >= WORTH_ADDING else None
 
 
 def _may_show(candidates: Sequence[screening.Candidate], scans: Sequence[Scan], before: Mapping[str, float]) -> bool:
     """Whether any candidate is worth a refit, by what its name was beside fewer effects, or by the scan."""
-    by_scan = (float(screening.log_bayes(c, scans)[0][0]) for c in candidates)
+    by_scan = (float(screening.scanned(c, scans).log_bayes[0]) for c in candidates)
     hopeless = all(value < WORTH_A_REFIT for value in chain(before.values(), by_scan))
     return bool(candidates) and not hopeless

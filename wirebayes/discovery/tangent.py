@@ -8,6 +8,7 @@ import numpy as np
 
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model import likelihoods
+from wirebayes.model.column_units import parameter_of
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import NOISES, Sample
 from wirebayes.numeric.typing import Array
@@ -87,7 +88,7 @@ class Tangent:
 
 def moving_columns(problem: Problem) -> list[int]:
     """The columns of parameters that move the mean of the readings."""
-    return [i for i, name in enumerate(problem.names) if name.split("[")[0] not in NOISES]
+    return [i for i, name in enumerate(problem.names) if parameter_of(name) not in NOISES]
 
 
 def tangent(target: LogPosterior, z: Array, readings: Sequence[Array] | None, moving: list[int]) -> Tangent:
@@ -147,7 +148,24 @@ def around_points(target: LogPosterior, z: Array, moving: list[int]) -> Around:
 
 @dataclass(frozen=True)
 class Point:
-    """One sample at n parameter sets: tension (H, R, n), derivatives (H, R, n, p), reading error (n,), and rows."""
+    """One sample at n parameter sets, with slopes by p coordinates.
+
+    Attributes
+    ----------
+    tension : (H, R, n) array
+    slopes : (H, R, n, p) array
+        Of the tensions.
+    sd : (n,) array
+        Reading error.
+    residual : (n, N) array
+        Readings less tensions; this and the others in units of the reading error, for the N readings that there are.
+    parameters : (n, N, p) array
+        The slopes.
+    by_setting : (n, N, H) array
+        What a standard deviation of each hold's setting error moves.
+    floor : (n,) array
+        Share of the reading error's variance that is rounding.
+    """
 
     tension: Array
     slopes: Array

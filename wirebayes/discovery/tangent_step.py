@@ -49,7 +49,7 @@ def stepped(
         value = prior - 0.5 * degrees * np.log(np.maximum(square, x.least))
     best = np.argmax(or_impossible(value), axis=0)
     rows = np.arange(len(z))
-    return np.asarray(trial[best, rows])
+    return trial[best, rows]
 
 
 def _tried(target: LogPosterior, places: Array, readings: Sequence[Array] | None) -> tuple[Array, Array]:
@@ -76,4 +76,4 @@ def _squares(x: Tangent, ratio: Array, residual: Array) -> Array:
     levels = residual.transpose(1, 0, 2) @ x.left
     shrink = damp(x.singular, ratio[:, None])
     whole_holds = (levels**2 @ shrink[..., None])[..., 0]
-    return np.asarray((residual**2).sum(axis=2) - whole_holds.T)
+    return (residual**2).sum(axis=2) - whole_holds.T

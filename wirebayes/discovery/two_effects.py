@@ -85,8 +85,9 @@ def _log_evidence(x: Expansion, found: Projected, first: Ints, groups: list[Ints
     # with no more readings than parameters, what explains nothing has no finite evidence
     evidence = or_impossible(evidence)
     prior = _log_shares(x, groups)
-    value = evidence + prior[first][:, :, None] + prior
+    prior_of_first = prior[first][:, :, None]
     kind_of_first = x.kinds[first][:, :, None]
+    value = evidence + prior_of_first + prior
     return np.where(kind_of_first != x.kinds, value, -np.inf)
 
 

@@ -161,9 +161,9 @@ def _after(
     return without, _more_beside(sets, without, beside, alike, odds)
 
 
-def _kinds(s: EffectSet, found: ModelPosterior) -> frozenset[tuple[Family, int]]:
+def _kinds(effects: EffectSet, found: ModelPosterior) -> frozenset[tuple[Family, int]]:
     """The families of a set's names, each numbered within its family: two names of one family are more than one."""
-    families = [found.family(name) for name in s.names]
+    families = [found.family(name) for name in effects.names]
     return frozenset((family, families[:k].count(family)) for k, family in enumerate(families))
 
 

@@ -193,7 +193,7 @@ class ScrewError(Effect):
         longest, shortest = 1.0 / self.longest, 1.0 / _SHORTEST
         count = 1 + min(int(np.ceil(4.0 * self.longest * (shortest - longest))), _MOST_PERIODS)
         turns = np.linspace(longest, shortest, count)
-        period, phase = self.columns()[1:]
+        period, phase = self.shape_columns
         sixths = np.arange(-2, 4) if self.of_several else np.arange(-1, 2)
         return [{period: float(1.0 / t), phase: float(p)} for t in turns for p in sixths * (np.pi / 3.0)]
 

@@ -57,7 +57,7 @@ class AtOnce(Effect):
 def _nearer(log_s: Array, log_creep: Array, exponent: Any, whole: Array) -> Array:
     """One of Newton's steps towards the elastic part of a whole strain, in its logarithm."""
     elastic, crept = np.exp(log_s), np.exp(log_creep + exponent * log_s)
-    return np.asarray(log_s - (elastic + crept - whole) / (elastic + exponent * crept))
+    return log_s - (elastic + crept - whole) / (elastic + exponent * crept)
 
 
 _NEWTON_STEPS = 7  # exact to rounding from where they start, in each of 20,000 draws of the prior; five leave 4e-9
@@ -89,7 +89,7 @@ class Logarithmic(_WithoutPlateau):
 
     def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         share = np.log1p(hold.time_s / own["t0"]) / np.log1p(self.long_s / own["t0"])
-        return np.asarray(share + 0.0 * value)
+        return share + 0.0 * value
 
 
 class PowerLaw(_WithoutPlateau):
@@ -103,7 +103,7 @@ class PowerLaw(_WithoutPlateau):
     sentence = "Creep grows with a power of time."
 
     def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
-        return np.asarray((hold.time_s / self.long_s) ** own["n"] + 0.0 * value)
+        return (hold.time_s / self.long_s) ** own["n"] + 0.0 * value
 
 
 class TwoModes(Effect):
@@ -122,7 +122,7 @@ class TwoModes(Effect):
     def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         rate = hold.theta["k2"] * hold.time_s
         share = (1.0 - own["slow_share"]) * -np.expm1(-rate) + own["slow_share"] * -np.expm1(-rate / own["slower"])
-        return np.asarray(share + 0.0 * value)
+        return share + 0.0 * value
 
 
 RIVALS: dict[str, type[Effect]] = {rival.name: rival for rival in (AtOnce, NotInTime, Logarithmic, PowerLaw, TwoModes)}

@@ -69,12 +69,12 @@ def between_specimens(logarithms: list[Floats], prior: _Moments, count: int, rng
 
     def log_density(log_s: Floats) -> Floats:
         log_prior = -0.5 * (((log_s - middle) / sd) ** 2).sum(1)
-        return _collapsed(log_s, information, prior)[0] + log_prior
+        log_likelihood, _, _ = _collapsed(log_s, information, prior)
+        return log_likelihood + log_prior
 
     start = np.full(len(prior[0]), middle)
     mode = _mode(log_density, start, _REACH * sd)
-    covariance = _covariance(log_density, mode, sd)
-    root = np.asarray(np.linalg.cholesky(covariance), np.float64)
+    root = np.asarray(np.linalg.cholesky(_covariance(log_density, mode, sd)), np.float64)
     log_s, weight = _weighted(log_density, mode, root, rng)
     rows = systematic_rows(weight, count, rng)
     chosen = log_s[rng.permutation(rows)]
@@ -92,7 +92,7 @@ def _mode(log_density: Callable[[Floats], Floats], start: Floats, reach: float) 
 
     bounds = [(middle - reach, middle + reach) for middle in start]
     found = optimize.minimize(unlikely, start, method="L-BFGS-B", bounds=bounds)
-    return np.asarray(found.x)
+    return found.x
 
 
 def _normal_draws(precision: Floats, vector: Floats, rng: Generator) -> Floats:
@@ -174,7 +174,7 @@ def _without_specimen(of_specimen: _Information, inverse: Floats) -> tuple[Float
 
 def _log_determinant(matrices: Floats) -> Floats:
     """(n,) of (n, p, p)."""
-    return np.asarray(np.linalg.slogdet(matrices)[1])
+    return np.linalg.slogdet(matrices)[1]
 
 
 def _covariance(log_density: Callable[[Floats], Floats], mode: Floats, sd: float) -> Floats:
@@ -182,8 +182,7 @@ def _covariance(log_density: Callable[[Floats], Floats], mode: Floats, sd: float
     curvature = _curvature(log_density, mode)
     sizes, axes = np.linalg.eigh(curvature)
     least = sd**-2
-    covariance = (axes / np.maximum(sizes, least)) @ axes.T
-    return np.asarray(covariance)
+    return (axes / np.maximum(sizes, least)) @ axes.T
 
 
 def _curvature(log_density: Callable[[Floats], Floats], mode: Floats) -> Floats:
@@ -198,4 +197,4 @@ def _curvature(log_density: Callable[[Floats], Floats], mode: Floats) -> Floats:
     both, one_back, other_back, both_back = at_corners.reshape(p * p, 4).T
     second = both - one_back - other_back + both_back
     hessian = -second.reshape(p, p) / (4 * _STEP**2)
-    return np.asarray(0.5 * (hessian + hessian.T))
+    return 0.5 * (hessian + hessian.T)

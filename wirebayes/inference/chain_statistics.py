@@ -218,7 +218,7 @@ def _pareto_quantiles(shape: float, size: int) -> Array:
     level = (np.arange(size) + 0.5) / size
     hazard = -np.log1p(-level)
     if shape == 0.0:
-        return np.asarray(hazard)
+        return hazard
     return np.expm1(shape * hazard) / shape
 
 

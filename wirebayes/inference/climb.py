@@ -92,7 +92,7 @@ class _Climbs:
     def gain_enough(self, rows: Ints, ahead: Array) -> Bools:
         """Whether rows gain what makes a step good, given their densities ahead; at its start any density will do."""
         least = np.where(self.arrived[rows], -np.inf, self.value[rows] + _ENOUGH * self.promised[rows])
-        return np.asarray(np.isfinite(ahead) & (ahead > least))
+        return np.isfinite(ahead) & (ahead > least)
 
     def lead_back(self, density: Density, rows: Ints) -> None:
         """Rows that do not gain enough: done if they have just begun, else led to where a damped step leads."""
@@ -143,7 +143,7 @@ class _Climbs:
 
     def most_promised(self, rows: Ints) -> Array:
         """(n,) densities that rows hardly rise beyond."""
-        return np.asarray(self.value[rows] + _PATIENCE * self.promised[rows])
+        return self.value[rows] + _PATIENCE * self.promised[rows]
 
     def give_up(self, rows: Ints) -> None:
         self.done[rows], self.value[rows] = True, -np.inf
@@ -264,7 +264,7 @@ def curved(density: Density, found: Optimum, which: Ints | None = None) -> Optim
 def _log_volume(curvature: Array) -> Array:
     """(n,) log volumes of normal approximations with these curvatures (n, d, d), but for a constant."""
     _, log_determinant = np.linalg.slogdet(curvature)
-    return np.asarray(-0.5 * log_determinant)
+    return -0.5 * log_determinant
 
 
 def _damped(
@@ -281,7 +281,7 @@ def _damped(
 def _half_decrement(slope: Array, eigen: Array) -> Array:
     """(n,) what a Newton step gains where slopes (n, d) and curvatures (n, d), along its own axes, are right."""
     with np.errstate(over="ignore"):  # far out, it may gain without bound
-        return np.asarray(0.5 * (slope**2 / eigen).sum(axis=1))
+        return 0.5 * (slope**2 / eigen).sum(axis=1)
 
 
 def _step(slope: Array, eigen: Array, vectors: Array, damping: Array) -> Array:

@@ -41,18 +41,20 @@ def gradient_and_hessian(
     (n, d) and (n, d, d) arrays
     """
     d = z.shape[1]
-    found = _beside(density, z, rows, value, _differences(d, sides) * h[:, None])
+    moves = _differences(d, sides) * h[:, None]
+    found = _beside(density, z, rows, value, moves)
     centre = value[:, None]
     plus = found[:, :d]
     minus = found[:, d : 2 * d]
     gradient = (plus - minus) / (2.0 * h)
+    bend = (plus + minus - 2.0 * centre) / h**2
     i, j = np.triu_indices(d, 1)
     both_plus, both_minus = np.split(found[:, 2 * d :], [len(i)], axis=1)
     mixed = both_plus - plus[:, i] - plus[:, j] + centre
     if sides == 2:
         mixed = 0.5 * (mixed + both_minus - minus[:, i] - minus[:, j] + centre)
-    hessian = _symmetric((plus + minus - 2.0 * centre) / h**2, mixed / (h[:, i] * h[:, j]))
-    return gradient, hessian
+    mixed_bend = mixed / (h[:, i] * h[:, j])
+    return gradient, _symmetric(bend, mixed_bend)
 
 
 def _symmetric(diagonal: Array, above: Array) -> Array:

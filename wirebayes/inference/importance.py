@@ -77,7 +77,19 @@ class Weighted:
 
 @dataclass(frozen=True)
 class _Past:
-    """All draws so far: points, (n, m) log densities, and each of the proposals (r, n) and how many are of it."""
+    """All draws so far.
+
+    Attributes
+    ----------
+    z : (n, d) array
+    log_density : (n, m) array
+        Of each density.
+    log_proposals : (r, n) array
+        Log density of each proposal.
+    proposals : tuple of Mixture or Proposal
+    counts : tuple of int
+        How many of the draws are of each.
+    """
 
     z: Array
     log_density: Array
@@ -118,7 +130,8 @@ class _Past:
         share = np.clip(ess / found[known], 1.0, _MOST_SHARE)
         normalised = self.log_density[:, known] - logsumexp(log_weight[:, known], axis=0)
         together = np.logaddexp.reduce(normalised + np.log(share), axis=1)
-        hot, cold = (WeightedPoints.weighted(self.z, power * together - drawn_from) for power in (_HOT, 1.0))
+        hot = WeightedPoints.weighted(self.z, _HOT * together - drawn_from)
+        cold = WeightedPoints.weighted(self.z, together - drawn_from)
         return hot, cold
 
 
@@ -177,14 +190,16 @@ def importance_sample(
         past = _Past.first(fresh) if past is None else past.joined(fresh)
         hot, cold = past.points(wanted, ess)
         if len(witness):
-            hot, cold = (_remembering(points, witness) for points in (hot, cold))
+            hot = _remembering(hot, witness)
+            cold = _remembering(cold, witness)
         current = _learned(hot, cold, start, order, rng, current)
     return replace(fresh, settled=settled, log_integral=log_integral, log_ratio=log_ratio)
 
 
 def _remembering(points: WeightedPoints, witness: Array) -> WeightedPoints:
     """Points with the draws (k, d) that were known before, which keep a share of the weight."""
-    return points.joined(WeightedPoints.equal(witness).worth(_REMEMBERED * points.weight.sum()))
+    known = WeightedPoints.equal(witness)
+    return points.joined(known.worth(_REMEMBERED * points.weight.sum()))
 
 
 def from_draws(
@@ -243,12 +258,13 @@ def _weighted(
     for those that are not `settled` (m,) before.
     """
     z = current.rvs(n, rng)
-    log_density, log_proposal = densities(z), current.log_density(z)
+    log_density = densities(z)
+    log_proposal = current.log_density(z)
     log_weight = log_density - log_proposal[:, None]
     asked = ~settled | (np.arange(log_weight.shape[1]) == 0)
     enough = asked & (effective(log_weight) >= ess)
     trusted = [bool(e) and tail(w) <= LARGEST_K for e, w in zip(enough, log_weight.T, strict=True)]
-    log_integral = np.asarray(logsumexp(log_weight, axis=0) - np.log(n))
+    log_integral = logsumexp(log_weight, axis=0) - np.log(n)
     log_ratio = log_integral - log_integral[0]
     return Weighted(z, log_density, log_proposal, np.array(trusted), log_integral, log_ratio, current)
 
@@ -277,7 +293,8 @@ def expected(fresh: Weighted, witness: Array, height: Array) -> float:
     if not len(witness):
         return float(len(fresh.z))
     over = height - fresh.proposal.log_density(witness) - fresh.log_integral[0]
-    return float(len(fresh.z) * np.exp(min(np.log(len(over)) - logsumexp(over), 0.0)))
+    log_share = min(np.log(len(over)) - logsumexp(over), 0.0)
+    return float(len(fresh.z) * np.exp(log_share))
 
 
 def tail(log_weight: Array) -> float:
@@ -290,7 +307,8 @@ def tail(log_weight: Array) -> float:
     if not len(values):
         return np.nan
     with np.errstate(all="ignore"):
-        all_of_it, largest = (pareto_smoothed(values, share)[1] for share in (1.0, 9.0))
+        _, all_of_it = pareto_smoothed(values, 1.0)
+        _, largest = pareto_smoothed(values, 9.0)
     return float(np.fmin(all_of_it, largest))
 
 

@@ -11,7 +11,7 @@ from wirebayes.inference.modes import modes
 from wirebayes.inference.optimum import Optimum
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.build import build
-from wirebayes.model.column_units import unit_of_column
+from wirebayes.model.column_units import parameter_of, unit_of_column
 from wirebayes.model.linear_amplitudes import integrated
 from wirebayes.model.problem import Problem
 from wirebayes.model.scales import NATURAL, Scales
@@ -92,8 +92,9 @@ class LaplaceFit:
         """
         name = effect.columns()[amplitude]
         column = _column(self.target.problem, name)
+        sd = np.sqrt(self.modes.covariance[0, column, column])
         z = np.repeat(self.z, len(deviations), axis=0)
-        z[:, column] += np.asarray(deviations) * np.sqrt(self.modes.covariance[0, column, column])
+        z[:, column] += np.asarray(deviations) * sd
         amplitudes = self.target.coordinates.to_natural(z)[:, column]
         return amplitudes * self.target.problem.units.of(self._unit(effect, name))
 
@@ -105,7 +106,7 @@ class LaplaceFit:
 
     def unit(self, effect: Effect) -> str:
         """The natural unit of an effect's amplitude, which depends on what is read."""
-        return self._unit(effect, effect.columns()[0])
+        return self._unit(effect, effect.amplitude_column)
 
     def _unit(self, effect: Effect, column: str) -> str:
         problem = self.target.problem
@@ -182,22 +183,20 @@ class Pinned:
 
     def starts(self, shapes: Mapping[str, float]) -> Array:
         """(k, d) starts: the best modes without the effect, its shape constants as given, or else at their medians."""
-        problem, plain = self.target.problem, self._plain.target
-        names = list(problem.names)
-        names.pop(self.column)
+        problem = self.target.problem
+        plain = self._plain.target
         best = self._plain.modes.z[:_BEST_MODES]
         natural = plain.coordinates.to_natural(best)
-        theta = np.empty((len(natural), len(names)))
-        for i, name in enumerate(names):
-            if name in plain.problem.names:
-                known = plain.problem.names.index(name)
-                theta[:, i] = natural[:, known]
-            else:
+        known = dict(zip(plain.problem.names, natural.T, strict=True))
+        theta = np.zeros((len(natural), len(problem.names)))
+        for i, name in enumerate(problem.names):
+            if name in known:
+                theta[:, i] = known[name]
+            elif i != self.column:
                 prior = problem.prior.distributions[name]
-                given = shapes.get(name.split("[")[0], prior.median())
+                given = shapes.get(parameter_of(name), prior.median())
                 theta[:, i] = np.clip(given, *prior.ppf(_INSIDE))
-        with_effect = np.insert(theta, self.column, 0.0, axis=1)
-        sampled = self.target.coordinates.to_sampled(with_effect)
+        sampled = self.target.coordinates.to_sampled(theta)
         return self._drop(sampled)
 
     def climb(self, start: Array, amplitude: Array) -> Optimum:
@@ -233,8 +232,9 @@ class Pinned:
             With which.
         """
         own = [column - (column > self.column) for column in self.common]
-        sd = np.sqrt(np.diagonal(ends.covariance, axis1=1, axis2=2)[:, own])
-        return np.log(self.natural(ends.z, amplitude)[:, self.common] * self._units), sd
+        variance = np.diagonal(ends.covariance, axis1=1, axis2=2)[:, own]
+        value = self.natural(ends.z, amplitude)[:, self.common] * self._units
+        return np.log(value), np.sqrt(variance)
 
     def log_prior_of_shape(self, number: int, log_value: Array) -> Array:
         """(n,) log density of the logarithm of one of these constants.
@@ -246,9 +246,11 @@ class Pinned:
         log_value : (n,) array
             Of mm, N or s.
         """
+        problem = self.target.problem
+        name = problem.names[self.common[number]]
+        prior = problem.prior.distributions[name]
         log_own = log_value - np.log(self._units[number])
-        prior = self.target.problem.prior.distributions[self.target.problem.names[self.common[number]]]
-        return np.asarray(prior.logpdf(np.exp(log_own)) + log_own)
+        return prior.logpdf(np.exp(log_own)) + log_own
 
     def natural(self, z: Array, amplitude: Array) -> Array:
         """(n, d) parameters of all columns."""
@@ -264,9 +266,9 @@ class Pinned:
 
 def column_of(problem: Problem, effect: Effect) -> int:
     """The column of an effect's amplitude."""
-    return _column(problem, effect.columns()[0])
+    return _column(problem, effect.amplitude_column)
 
 
 def _column(problem: Problem, name: str) -> int:
     """The column of a parameter of an effect, whichever material has it."""
-    return next(i for i, own in enumerate(problem.names) if own.split("[")[0] == name)
+    return next(i for i, own in enumerate(problem.names) if parameter_of(own) == name)

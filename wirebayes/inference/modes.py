@@ -83,10 +83,16 @@ def searches(
     """
     side_by_side = _SideBySide(target, n, readings)
     drawn = [_prior(target, _DRAWS_FOR_A_START * starts, rng) for _ in range(n)]
-    prior = [_possible(z, side_by_side.density(z, np.full(len(z), i))) for i, z in enumerate(drawn)]
-    spread = side_by_side.with_ratios([_spread(target, z, _FIRST, rng) for z in prior])
-    found = side_by_side.climbed([b if extra is None else np.vstack([b, extra]) for b in spread], [])
-    return side_by_side.further(found, [_some(z, starts, rng) for z in prior])
+    possible = []
+    for i, z in enumerate(drawn):
+        value = side_by_side.density(z, np.full(len(z), i))
+        possible.append(_possible(z, value))
+    begin = side_by_side.with_ratios([_spread(target, z, _FIRST, rng) for z in possible])
+    if extra is not None:
+        begin = [np.vstack([places, extra]) for places in begin]
+    found = side_by_side.climbed(begin, [])
+    others = [_some(z, starts, rng) for z in possible]
+    return side_by_side.further(found, others)
 
 
 @dataclass(frozen=True)
@@ -227,8 +233,9 @@ class _SideBySide:
         best_of_row = np.repeat(best, [len(places) for places in begin], axis=0)
 
         def held(z: Array, rows: Array) -> Array:
-            z[:, self.settings] = best_of_row[rows][:, self.settings] + _SETTING_UP
-            z[:, self.sensors] = best_of_row[rows][:, self.sensors] - _SENSOR_DOWN
+            best_there = best_of_row[rows]
+            z[:, self.settings] = best_there[:, self.settings] + _SETTING_UP
+            z[:, self.sensors] = best_there[:, self.sensors] - _SENSOR_DOWN
             return z
 
         noises = [*self.settings, *self.sensors]
@@ -298,9 +305,13 @@ def _spread(target: LogPosterior, z: Array, n: int, rng: Generator) -> Array:
     kinds = target.coordinates.kinds_of_creep
     if not kinds:
         return _some(z, n, rng)
-    found = np.stack([np.argsort(np.argsort(z[:, columns].mean(axis=1))) / len(z) for columns in kinds], axis=1)
-    wanted = np.resize(_RANKS, (n, 2))[:, : len(kinds)] + _WITHIN * rng.uniform(-1.0, 1.0, (n, len(kinds)))
-    return z[((found - wanted[:, None]) ** 2).sum(axis=2).argmin(axis=1)]
+    ranks = [np.argsort(np.argsort(z[:, columns].mean(axis=1))) for columns in kinds]
+    found = np.stack(ranks, axis=1) / len(z)
+    anywhere = rng.uniform(-1.0, 1.0, (n, len(kinds)))
+    wanted = np.resize(_RANKS, (n, 2))[:, : len(kinds)] + _WITHIN * anywhere
+    off = found - wanted[:, None]
+    nearest = (off**2).sum(axis=2).argmin(axis=1)
+    return z[nearest]
 
 
 def _cooled(density: Function, z: Array, value: Array, rng: Generator) -> tuple[Array, Array]:

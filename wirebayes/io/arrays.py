@@ -119,7 +119,7 @@ def _stated(values: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def protocol_of_columns(columns: Any, control: Control = "displacement") -> CsvTable:
+def protocol_of_columns(columns: Any, control: Control) -> CsvTable:
     """The table of a protocol from a DataFrame or a mapping of columns; NaN in what is read is an empty cell."""
     return table_of(columns, Path("protocol"), *protocol_columns(control), may_be_empty=(READ[control],))
 

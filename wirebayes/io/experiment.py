@@ -202,13 +202,13 @@ def holds_and_readings(holds: Sequence[Hold]) -> str:
     return f"{counted(len(recorded), 'hold')} with {counted(sum(recorded), 'reading')}"
 
 
-def protocol_of(holds: tuple[Hold, ...], length_mm: float, reference_C: float | None = None) -> Protocol:
+def protocol_of(holds: tuple[Hold, ...], length_mm: float, reference_C: float | None) -> Protocol:
     """Pad holds to rectangular arrays.
 
     Parameters
     ----------
     holds : tuple of Hold
-    reference_C : float, optional
+    reference_C : float or None
         Temperature from which warming counts; without it there is no warming.
 
     Returns

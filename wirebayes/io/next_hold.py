@@ -18,7 +18,7 @@ def next_hold_of(name: str) -> str:
     return f"next-{name}.csv"
 
 
-def write_next_holds(experiments: Sequence[Experiment], folder: Path, *, hold_by_hold: bool = False) -> None:
+def write_next_holds(experiments: Sequence[Experiment], folder: Path, *, hold_by_hold: bool) -> None:
     """Write an example of the first test of a fit, and of the first one of every other kind that it has.
 
     Tests are of one kind where the same is set and temperatures are known of both or of neither: their examples have

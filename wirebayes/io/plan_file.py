@@ -127,7 +127,7 @@ def read_plan(path: Path, effects: Sequence[str] = ()) -> PlanFile:
         refuse_second(keys, test.name, [other.name for other in tests])
         tests.append(test)
     guess = _guess(top)
-    posterior = _path(top, "posterior", "the folder of a fit")
+    posterior = _posterior_folder(top)
     if posterior is not None and guess:
         raise top.complain("posterior", "a posterior beside a [guess]", "one of them")
     expected = "a time budget above 0 min"
@@ -259,13 +259,16 @@ def _guess(top: Keys) -> dict[str, Any]:
     return inner.table
 
 
-def _path(top: Keys, key: str, expected: str) -> Path | None:
-    if key not in top.table:
+def _posterior_folder(top: Keys) -> Path | None:
+    """The folder that the plan names; None where it names none."""
+    if "posterior" not in top.table:
         return None
-    path = top.source.parent / top.string(key, expected)
-    if not os.path.isdir(path):
-        raise top.complain(key, f"{shown(top.table[key])}, which is no folder there", expected)
-    return path
+    expected = "the folder of a fit"
+    stated = top.string("posterior", expected)
+    folder = top.source.parent / stated
+    if not os.path.isdir(folder):
+        raise top.complain("posterior", f"{shown(stated)}, which is no folder there", expected)
+    return folder
 
 
 def _aim(top: Keys, effects: Sequence[str]) -> tuple[str, ...]:

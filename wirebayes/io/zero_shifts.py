@@ -6,6 +6,7 @@ back is an error of a single setting.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -55,21 +56,33 @@ class _Moves:
         return added - self.moved * (slope * self.middle + np.median(each - slope * self.middle))
 
 
+class _Shift(NamedTuple):
+    """A step that stands out, and by how much; the hold that it leads to, what it adds, what was expected of it."""
+
+    excess: float
+    hold: int
+    added: float
+    expected: float
+
+
 def zero_shift(readings: CheckedTest) -> str:
     """The step between two holds that stands out most from what the moves beside it add, in a sentence."""
     found = []
     for way in (1.0, -1.0):
-        shift = _shift(_moves(readings, way), readings.noise)
-        if shift is not None:
-            found.append(shift)
+        one_way = _shift(_moves(readings, way), readings.noise)
+        if one_way is not None:
+            found.append(one_way)
     if not found:
         return ""
-    _, hold, step, expected = max(found)
+    shift = max(found)
     what = "tension" if readings.protocol.control == "displacement" else "displacement"
-    before, after = readings.number[hold - 1], readings.number[hold]
+    before = readings.number[shift.hold - 1]
+    after = readings.number[shift.hold]
+    added = f"{short(shift.added, 3)} {readings.unit}"
+    expected = f"{short(shift.expected, 3)} {readings.unit}"
     return (
-        f"from hold {before} to hold {after} the {what} changes by {short(step, 3)} {readings.unit}, where the other "
-        f"moves suggest {short(expected, 3)} {readings.unit}, and the difference stays: was the sensor zeroed there, "
+        f"from hold {before} to hold {after} the {what} changes by {added}, where the other "
+        f"moves suggest {expected}, and the difference stays: was the sensor zeroed there, "
         "did the wire slip, or is time or a move not recorded? correct the readings from there on, or leave them out"
     )
 
@@ -119,8 +132,8 @@ def _late(readings: CheckedTest) -> Bools:
     return first_s - np.median(first_s) > LATE * until_second_s
 
 
-def _shift(moves: _Moves, noise: float) -> tuple[float, int, float, float] | None:
-    """How far the step that stands out most does so, its hold, what it adds, and what was expected of it."""
+def _shift(moves: _Moves, noise: float) -> _Shift | None:
+    """The step that stands out most; None where none does."""
     added = moves.added
     if len(added) < FEWEST:
         return None
@@ -138,7 +151,7 @@ def _shift(moves: _Moves, noise: float) -> tuple[float, int, float, float] | Non
         excess = float(sizes[i] / max(others, scatter))
         if excess > STANDS_OUT and _stays(moves.hold, off, inner, i):
             hold = int(moves.hold[i])
-            found.append((excess, hold, float(added[i]), float(expected[i])))
+            found.append(_Shift(excess, hold, float(added[i]), float(expected[i])))
     return max(found, default=None)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment, by_material
-from wirebayes.model.column_units import unit_of_column
+from wirebayes.model.column_units import parameter_of, unit_of_column
 from wirebayes.model.prior import PowerScaled, Prior, from_table, possible, wire_defaults
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import LENGTH_EXPONENT, MATERIAL, SAMPLE, Sample
@@ -202,7 +202,7 @@ def _positive(free: Mapping[str, Any], effects: Sequence[Effect]) -> frozenset[s
     A log-uniform prior ends on both sides, where climbs by the logarithm would run into a wall.
     """
     positive = _POSITIVE | {c for c, a in _amplitudes(effects) if a.is_shape}
-    by_nature = {n: ours(d) for n, d in free.items() if n.split("[")[0] in positive}
+    by_nature = {n: ours(d) for n, d in free.items() if parameter_of(n) in positive}
     return frozenset(n for n, d in by_nature.items() if d.support()[0] >= 0 and not isinstance(d, LogUniform))
 
 

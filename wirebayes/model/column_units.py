@@ -12,6 +12,11 @@ _UNITS = {"k1": "N", "B": "mm", "preload": "mm"}
 _ERRORS = {"sensor_sd": READ_UNIT, "setting_sd": SET_UNIT}
 
 
+def parameter_of(column: str) -> str:
+    """The parameter that a column belongs to, whatever its sample or material."""
+    return column.split("[")[0]
+
+
 def unit_of_column(name: str, samples: Sequence[Sample]) -> str:
     """The unit of a column in mm, N and s; of ``B`` and ``k2`` without the part that depends on U and N.
 

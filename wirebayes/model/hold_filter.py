@@ -126,8 +126,19 @@ class LinearHold(NamedTuple):
 class HoldRead(NamedTuple):
     """What the readings of one hold say.
 
-    Mean and variance (n,) of the creep carried on, and the variance of the one carried in; what the readings leave over
-    (R, n); by how much they pull at the creep carried in and at the setting error (n,), and what they know of either.
+    Attributes
+    ----------
+    mean, var : (n,) arrays
+        Of the creep carried on.
+    var_before : (n,) array
+        Variance of the creep carried in.
+    left : (R, n) array
+        What the best errors leave over of the readings.
+    pulls : (n,), (n,) arrays
+        By how much the readings pull at the creep carried in, and at the setting error.
+    known : HoldInformation
+        What they say of either.
+    noise : ReadingNoise
     """
 
     mean: Array
@@ -203,10 +214,16 @@ def summed(one: Array, other: Array) -> Array:
 
 
 class HoldInformation(NamedTuple):
-    """What a hold says about the creep carried in, c, and its setting error, s; all (n,).
+    """What a hold says about the creep carried in, c, and its setting error, s.
 
-    Products of the slopes, the determinant by which the readings' covariance exceeds that of sensor errors alone, and
-    the covariance of the two given the readings.
+    Attributes
+    ----------
+    cc, cs, ss : (n,) arrays
+        Products of the slopes by either, times the weight of a reading.
+    det : (n,) array
+        Determinant by which the readings' covariance exceeds that of sensor errors alone.
+    v_cc, v_cs, v_ss : (n,) arrays
+        Covariance of the two given the readings.
     """
 
     cc: Array

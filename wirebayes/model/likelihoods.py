@@ -52,7 +52,7 @@ class Filtered:
 
 def reading_variance(sensor_sd: Array, resolution: float) -> Array:
     """Variance of one reading, N² or mm²: sensor error and rounding."""
-    return np.asarray(sensor_sd * sensor_sd + resolution * resolution / 12.0)
+    return sensor_sd * sensor_sd + resolution * resolution / 12.0
 
 
 def chain(line: "Linearised | Staircases", measured: Measured) -> Filtered:
@@ -242,8 +242,16 @@ def seen(line: Linearised, filtered: Filtered, measured: Measured, shapes: Array
 class _ShapesOfHold(NamedTuple):
     """Shapes in the readings of a hold, in variances.
 
-    Their products (k, k, n), and what errors explain of these; those errors (k, n) of the creep carried in and of the
-    setting, and what they leave of the shapes (r, k, n).
+    Attributes
+    ----------
+    square : (k, k, n) array
+        Their products with each other.
+    explained : (k, k, n) array
+        What errors explain of these.
+    creep, setting : (k, n) arrays
+        These errors: of the creep carried in, and of the setting.
+    left : (r, k, n) array
+        What they leave of the shapes.
     """
 
     square: Array
@@ -276,12 +284,12 @@ class _ShapesOfHold(NamedTuple):
 
 def _products(one: Array, other: Array) -> Array:
     """(k, k, n) products of rows (k, n)."""
-    return np.asarray(np.einsum("kn,ln->kln", one, other))
+    return np.einsum("kn,ln->kln", one, other)
 
 
 def _along(slopes: Array, shapes: Array) -> Array:
     """(k, n) sums over the readings of slopes (R, n) times shapes (R, k, n)."""
-    return np.asarray(np.einsum("rn,rkn->kn", slopes, shapes))
+    return np.einsum("rn,rkn->kn", slopes, shapes)
 
 
 def setting_jacobian(line: Linearised) -> Array:

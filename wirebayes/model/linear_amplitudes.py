@@ -164,7 +164,7 @@ class _Seen:
     def amplitudes(self, along: Array) -> Array:
         """(n, k) those whose product with the factor's transpose is `along` (n, k)."""
         inverse = np.swapaxes(linear_algebra.inv(self.factor), 1, 2)
-        return np.asarray((inverse @ along[..., None])[..., 0])
+        return (inverse @ along[..., None])[..., 0]
 
 
 def integrated(problem: Problem) -> Problem:

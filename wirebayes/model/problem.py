@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from wirebayes.model import likelihoods, single_holds
-from wirebayes.model.column_units import sample_in, unit_of_column, units_ratio
+from wirebayes.model.column_units import parameter_of, sample_in, unit_of_column, units_ratio
 from wirebayes.model.hold_filter import Measured
 from wirebayes.model.prior import PowerScaled, Prior
 from wirebayes.model.sample import LENGTH_EXPONENT, Likelihood, Sample, at_length
@@ -216,7 +216,7 @@ class Problem:
             return NATURAL
         own = self.scales.units
         known = {column for column, value in self.prior.fixed.items() if value != 0.0}
-        named = {column.split("[")[0] for column in self.stated | known}
+        named = {parameter_of(column) for column in self.stated | known}
         return Units(own.length_mm, 1.0 if "B" in named else own.tension_N, 1.0 if "k2" in named else own.time_s)
 
     def in_units(self, units: Units) -> "Problem":

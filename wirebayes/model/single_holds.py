@@ -68,9 +68,20 @@ def standardised_hold_by_hold(
 
 
 class _SingleHold(NamedTuple):
-    """One hold where its length is known (n,): later residuals (r, n) and the first reading's error at their best.
+    """One hold, its error of the first reading at its best.
 
-    And the squared ratio (n,) of slopes, summed over the later readings.
+    Attributes
+    ----------
+    number : int
+        Position of the hold.
+    valid : (n,) bool array
+        Where its length is known.
+    left : (r, n) array
+        What is left of the later readings.
+    first : (n,) array
+        Error of the first reading.
+    ratio_square : (n,) array
+        Squared ratios of the slopes of the later readings to that of the first, summed.
     """
 
     number: int

@@ -23,4 +23,4 @@ def log_sum(logs: Array, axis: int = 0) -> Array:
     top = logs.max(axis=axis, keepdims=True)
     top = np.where(np.isfinite(top), top, 0.0)
     with np.errstate(divide="ignore"):
-        return np.asarray(np.log(np.exp(logs - top).sum(axis=axis)) + top.squeeze(axis))
+        return np.log(np.exp(logs - top).sum(axis=axis)) + top.squeeze(axis)

@@ -39,7 +39,7 @@ class Forecast:
     @property
     def band_N(self) -> Array:
         """(3, m) 5 %, 50 % and 95 % quantiles."""
-        return np.asarray(np.quantile(self.drawn_N, [0.05, 0.5, 0.95], axis=1))
+        return np.quantile(self.drawn_N, [0.05, 0.5, 0.95], axis=1)
 
     @property
     def rms_N(self) -> float:

@@ -1,6 +1,7 @@
 """Table 4 beside our own least squares: published and refitted parameters in every interpretation of the model."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ def identification_rows(
     published: Mapping[str, Mapping[str, float]],
     training_holds: int,
     seed: int,
-    parallel_map: ParallelMap = map,
+    parallel_map: ParallelMap,
 ) -> list[Row]:
     """One row for each wire, variant and source of the parameters.
 
@@ -29,7 +30,7 @@ def identification_rows(
     published : mapping of experiment name to parameters
     training_holds : int
         Both are adjusted to these first holds: all parameters, or the preload that the published ones lack.
-    parallel_map : function, optional
+    parallel_map : function
         The built-in `map`, or one over processes.
 
     Returns
@@ -37,22 +38,24 @@ def identification_rows(
     list of dict
         Parameters, and the rms of what each predicts on the training holds, on the rest and on all, in N.
     """
-    wires = [(experiment, dict(published[experiment.name]), training_holds, seed) for experiment in experiments]
+    of_wire = partial(_rows_of_wire, training_holds=training_holds, seed=seed)
+    own = [dict(published[experiment.name]) for experiment in experiments]
     rows = []
-    for of_wire in parallel_map(_wire, wires):
-        rows += of_wire
+    for found in parallel_map(of_wire, experiments, own):
+        rows += found
     return rows
 
 
-def _wire(task: tuple[Experiment, dict[str, float], int, int]) -> list[Row]:
-    experiment, published, training_holds, seed = task
-    first, cut = experiment.train(training_holds), leading(experiment, training_holds)
+def _rows_of_wire(experiment: Experiment, published: dict[str, float], training_holds: int, seed: int) -> list[Row]:
+    first = experiment.train(training_holds)
+    cut = leading(experiment, training_holds)
     out = []
     for variant in VARIANTS:
         words = ("least squares", experiment.name, variant.likelihood, variant.history, variant.law)
         for source, known in (("published", published), ("refitted", None)):
             rng = np.random.default_rng(seed_of(seed, *words))
-            out.append(_row(experiment, variant, source, identify(first, variant, rng, known), cut))
+            found = identify(first, variant, rng, known)
+            out.append(_row(experiment, variant, source, found, cut))
     return out
 
 

@@ -229,8 +229,8 @@ def _descend(misfit: Function, start: Array, low: Array, high: Array) -> Array:
     """One least-squares descent."""
 
     def at_point(z: Array) -> Array:
-        return np.asarray(misfit(z[None])[:, 0])
+        return misfit(z[None])[:, 0]
 
     jacobian = partial(_jacobian, misfit)
     found = least_squares(at_point, start, jac=jacobian, bounds=(low, high), x_scale="jac", max_nfev=300)
-    return np.asarray(found.x)
+    return found.x

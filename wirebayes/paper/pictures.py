@@ -57,19 +57,22 @@ class Gallery:
         """Write the index."""
         write_json(self.folder / INDEX, self.index)
 
-    def measured(self, e: Experiment) -> None:
+    def measured(self, experiment: Experiment) -> None:
         """The test as it was read."""
-        figure = figures.measured(e.protocol(), e.tension(), f"{e.name}: {e.material}, {e.length_mm:g} mm")
-        holds = len(e.recorded_holds)
-        alt = f"Tension of {e.name} against displacement: {holds} holds, each losing tension while it lasts."
-        self.add("measured", e.name, figure, alt)
+        title = f"{experiment.name}: {experiment.material}, {experiment.length_mm:g} mm"
+        figure = figures.measured(experiment.protocol(), experiment.tension(), title)
+        holds = len(experiment.recorded_holds)
+        alt = f"Tension of {experiment.name} against displacement: {holds} holds, each losing tension while it lasts."
+        self.add("measured", experiment.name, figure, alt)
 
-    def intervals(self, e: Experiment, rows: Sequence[Mapping[str, Any]]) -> None:
+    def intervals(self, experiment: Experiment, rows: Sequence[Mapping[str, Any]]) -> None:
         """What is known of each parameter, beside the published value."""
-        alt = f"90 % intervals of the parameters of {e.name} before and after the test, in multiples of Table 4."
-        self.add("known", e.name, paper_figures.intervals(rows, e.name), alt)
+        alt = (
+            f"90 % intervals of the parameters of {experiment.name} before and after the test, in multiples of Table 4."
+        )
+        self.add("known", experiment.name, paper_figures.intervals(rows, experiment.name), alt)
 
-    def last_hold(self, e: Experiment, published: dict[str, float], first: Stored, rng: Generator) -> None:
+    def last_hold(self, experiment: Experiment, published: dict[str, float], first: Stored, rng: Generator) -> None:
         """The paper's figures 1 to 4: the last hold of a wire, with the paper's curve and the predicted band.
 
         Parameters
@@ -79,17 +82,17 @@ class Gallery:
         first : Stored
             Posterior of the first holds, hold by hold.
         """
-        hold = e.recorded_holds[-1]
+        hold = experiment.recorded_holds[-1]
         times = np.linspace(0.0, hold.duration_s, 49)
-        drawn, curve = last_hold_course(first, e, times, rng), published_course(published, e, times)
-        title = f"{e.name}: last hold, {hold.displacement_mm:g} mm"
+        drawn, curve = last_hold_course(first, experiment, times, rng), published_course(published, experiment, times)
+        title = f"{experiment.name}: last hold, {hold.displacement_mm:g} mm"
         figure = paper_figures.last_hold(times, drawn, curve, (hold.time_s, hold.tension_N), title)
         missed = np.interp(hold.time_s[1:], times, curve) - hold.tension_N[1:]
-        alt = f"The last hold of {e.name}: measured tension, the paper's curve and the predicted band."
+        alt = f"The last hold of {experiment.name}: measured tension, the paper's curve and the predicted band."
         caption = f"The paper's curve misses these readings by {number(root_mean_square(missed), 2)} N (rms)."
-        self.add("figures-1-to-4", e.name, figure, alt, caption)
+        self.add("figures-1-to-4", experiment.name, figure, alt, caption)
 
-    def unused_holds(self, e: Experiment, published: dict[str, float], seen: Mapping[str, Forecast]) -> None:
+    def unused_holds(self, experiment: Experiment, published: dict[str, float], seen: Mapping[str, Forecast]) -> None:
         """All unused holds, hold by hold and as one chain.
 
         Parameters
@@ -100,14 +103,14 @@ class Gallery:
         """
         for likelihood, out in seen.items():
             spoken = figures.WORDS[likelihood]
-            curve = _published_at(e, published, out) if likelihood == "hold" else None
-            title, colour = f"{e.name}, {spoken}", figures.COLOURS[likelihood]
+            curve = _published_at(experiment, published, out) if likelihood == "hold" else None
+            title, colour = f"{experiment.name}, {spoken}", figures.COLOURS[likelihood]
             figure = figures.residual_figure(out.hold, out.time_s, out.measured_N, out.band_N, title, colour, curve)
-            alt = f"Measured minus predicted tension in the unused holds of {e.name}, {spoken}."
+            alt = f"Measured minus predicted tension in the unused holds of {experiment.name}, {spoken}."
             caption = f"rms {number(out.rms_N, 2)} N; {100 * out.coverage:.0f} % of the readings lie in the 90 % band."
-            self.add(f"unused-{likelihood}", e.name, figure, alt, caption)
+            self.add(f"unused-{likelihood}", experiment.name, figure, alt, caption)
 
-    def ridges(self, e: Experiment, published: Mapping[str, float], full: Mapping[str, Stored]) -> None:
+    def ridges(self, experiment: Experiment, published: Mapping[str, float], full: Mapping[str, Stored]) -> None:
         """What hold by hold cannot distinguish: stiffness and amount, amount and rate.
 
         Parameters
@@ -120,11 +123,11 @@ class Gallery:
         draws = {}
         for kind in ("hold", "chain"):
             draws[kind] = {name: some(values) for name, values in full[kind].draws.items()}
-        self._stiffness_and_amount(e, published, draws, full["hold"].draws)
-        self._amount_and_rate(e, published, draws, full["hold"].draws)
+        self._stiffness_and_amount(experiment, published, draws, full["hold"].draws)
+        self._amount_and_rate(experiment, published, draws, full["hold"].draws)
 
     def _stiffness_and_amount(
-        self, e: Experiment, published: Mapping[str, float], draws: _ByKind, by_hold: Mapping[str, Array]
+        self, experiment: Experiment, published: Mapping[str, float], draws: _ByKind, by_hold: Mapping[str, Array]
     ) -> None:
         stiffness = published["k1"]
         k1 = {kind: own["k1"] for kind, own in draws.items()}
@@ -132,55 +135,55 @@ class Gallery:
         xlabel = figures.axis_label("k1")
         ylabel = figures.axis_label("B")
         mark = (stiffness, published["B"])
-        figure = figures.joint(k1, amount, xlabel, ylabel, e.name, mark)
+        figure = figures.joint(k1, amount, xlabel, ylabel, experiment.name, mark)
         low, high = np.quantile(by_hold["k1"], [0.05, 0.95])
         span = f"{number(low, 2)} to {number(high, 2)} N"
         caption = f"Hold by hold, k1 may be anything from {span} if B changes with it."
-        caption += _near_the_stiffest_step(e, stiffness)
-        alt = f"Posterior draws of k1 and B of {e.name}: a long ridge hold by hold, a small cloud as a chain."
-        self.add("ridge", e.name, figure, alt, caption)
+        caption += _near_the_stiffest_step(experiment, stiffness)
+        alt = f"Posterior draws of k1 and B of {experiment.name}: a long ridge hold by hold, a small cloud as a chain."
+        self.add("ridge", experiment.name, figure, alt, caption)
 
     def _amount_and_rate(
-        self, e: Experiment, published: Mapping[str, float], draws: _ByKind, by_hold: Mapping[str, Array]
+        self, experiment: Experiment, published: Mapping[str, float], draws: _ByKind, by_hold: Mapping[str, Array]
     ) -> None:
         rate = {kind: own["k2"] for kind, own in draws.items()}
         amount = {kind: own["k1"] * own["B"] for kind, own in draws.items()}
         mark = (published["k2"], published["k1"] * published["B"])
         xlabel = figures.axis_label("k2")
-        figure = figures.joint(rate, amount, xlabel, "k1·B, N mm N⁻ᵁ", e.name, mark)
+        figure = figures.joint(rate, amount, xlabel, "k1·B, N mm N⁻ᵁ", experiment.name, mark)
         log_amount = np.log(by_hold["k1"] * by_hold["B"])
         log_rate = np.log(by_hold["k2"])
         correlations = np.corrcoef(log_amount, log_rate)
         correlation = number(float(correlations[0, 1]), 3)
-        time_s = e.recorded_holds[-1].duration_s
+        time_s = experiment.recorded_holds[-1].duration_s
         percent = 100 * _published_fraction(published, time_s)
         caption = (
             f"Correlation hold by hold {correlation} (of logarithms). By the paper's own numbers a hold of "
             f"{time_s:g} s shows {percent:.0f} % of the final creep."
         )
-        alt = f"Posterior draws of k2 and k1 B of {e.name}: much slow creep looks like little fast creep."
-        self.add("amount-and-rate", e.name, figure, alt, caption)
+        alt = f"Posterior draws of k2 and k1 B of {experiment.name}: much slow creep looks like little fast creep."
+        self.add("amount-and-rate", experiment.name, figure, alt, caption)
 
-    def prior(self, e: Experiment, rng: Generator) -> None:
+    def prior(self, experiment: Experiment, rng: Generator) -> None:
         """What the prior expects of this test."""
-        problem = build([e])
+        problem = build([experiment])
         sample, theta = problem.samples[0], problem.prior.rvs(4000, rng)
         drawn = replicate(problem, theta, sample, rng)
-        figure = paper_figures.prior_predictive(sample.protocol, drawn, e.tension(), e.name)
-        alt = f"First tensions and first hold of {e.name}: what the prior expects, and the readings."
-        self.add("prior", e.name, figure, alt)
+        figure = paper_figures.prior_predictive(sample.protocol, drawn, experiment.tension(), experiment.name)
+        alt = f"First tensions and first hold of {experiment.name}: what the prior expects, and the readings."
+        self.add("prior", experiment.name, figure, alt)
 
 
-def _published_at(e: Experiment, published: Mapping[str, float], out: Forecast) -> Array:
+def _published_at(experiment: Experiment, published: Mapping[str, float], out: Forecast) -> Array:
     """The paper's prediction of the unused readings, hold by hold."""
-    left = tension_residuals(e, at(published), ModelSpec(likelihood="hold"))[..., 0]
-    wanted = np.isfinite(left) & np.isin(e.protocol().number, out.hold)[:, None]
-    return np.asarray((e.tension() - left)[wanted])
+    left = tension_residuals(experiment, at(published), ModelSpec(likelihood="hold"))[..., 0]
+    wanted = np.isfinite(left) & np.isin(experiment.protocol().number, out.hold)[:, None]
+    return (experiment.tension() - left)[wanted]
 
 
-def _near_the_stiffest_step(e: Experiment, stiffness: float) -> str:
+def _near_the_stiffest_step(experiment: Experiment, stiffness: float) -> str:
     """A sentence that a published stiffness is that of the stiffest single step; empty where it is not."""
-    jump = stiffest_step(e)
+    jump = stiffest_step(experiment)
     if abs(jump / stiffness - 1) >= 0.02:
         return ""
     nearest = f"{number(stiffness, 4)} N is within 2 % of the stiffest single step between two holds"
@@ -193,12 +196,12 @@ def _published_fraction(published: Mapping[str, float], time_s: float) -> float:
     return float(creep_fraction(np.asarray(time_s), rate, shape))
 
 
-def stiffest_step(e: Experiment) -> float:
+def stiffest_step(experiment: Experiment) -> float:
     """Largest tension gained in one step between two neighbouring holds, per unit strain, N."""
     steps = []
-    for before, after in pairwise(e.holds):
+    for before, after in pairwise(experiment.holds):
         moved_mm = after.displacement_mm - before.displacement_mm
         if before.recorded and after.recorded and moved_mm != 0:
             gained_N = after.tension_N[0] - before.tension_N[-1]
-            steps.append(gained_N * e.length_mm / moved_mm)
+            steps.append(gained_N * experiment.length_mm / moved_mm)
     return float(max(steps))

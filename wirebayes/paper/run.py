@@ -181,7 +181,7 @@ def _stored(folder: Path, training: int) -> tuple[dict[str, Stored], dict[str, S
 
 def _rows(
     directory: Path,
-    e: Experiment,
+    experiment: Experiment,
     full: Mapping[str, Stored],
     seen: Mapping[str, Forecast],
     published: Mapping[str, float],
@@ -190,16 +190,16 @@ def _rows(
 ) -> dict[str, list[Row]]:
     """What each table says of one experiment."""
     out: dict[str, list[Row]] = {"posterior": [], "creep": [], "held_out": [], "sampling": []}
-    name = e.name
+    name = experiment.name
     for likelihood in LIKELIHOODS:
         stored = full[likelihood]
         draws = stored.draws
         tension = stored.sample.tested_tension_N
-        prior = build([e], (), ModelSpec(likelihood=likelihood)).prior
+        prior = build([experiment], (), ModelSpec(likelihood=likelihood)).prior
         rng = np.random.default_rng(seed_of(seed, "prior", name, likelihood))
         before = prior.named_draws(_PRIOR_DRAWS, rng)
         out["posterior"] += verdicts.verdict_rows(name, likelihood, draws, before, prior.powers, published)
-        out["creep"] += verdicts.creep_rows(name, likelihood, draws, published, tension, e.length_mm)
+        out["creep"] += verdicts.creep_rows(name, likelihood, draws, published, tension, experiment.length_mm)
         out["held_out"].append(_forecast_row(name, likelihood, seen[likelihood]))
         for suffix in ("", f"-first-{training}"):
             sampling = _sampling_row(directory, name, likelihood, suffix)
@@ -226,16 +226,16 @@ def _draw(
     gallery.prior(experiment, rng)
 
 
-def _measured_row(e: Experiment) -> Row:
-    recorded = e.recorded_holds
+def _measured_row(experiment: Experiment) -> Row:
+    recorded = experiment.recorded_holds
     tension = np.concatenate([hold.tension_N for hold in recorded])
     losses = [1 - hold.tension_N[-1] / hold.tension_N[0] for hold in recorded]
     return {
-        "experiment": e.name,
-        "material": e.material,
-        "length_mm": e.length_mm,
+        "experiment": experiment.name,
+        "material": experiment.material,
+        "length_mm": experiment.length_mm,
         "holds": len(recorded),
-        "unrecorded_holds": len(e.holds) - len(recorded),
+        "unrecorded_holds": len(experiment.holds) - len(recorded),
         "readings": len(tension),
         "smallest_tension_N": tension.min(),
         "largest_tension_N": tension.max(),

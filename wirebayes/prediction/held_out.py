@@ -271,7 +271,7 @@ def _most_extreme(counts: Array, own: Array, rows: int) -> Array:
     below = np.take_along_axis(with_at_most, everything, axis=1)
     as_many = np.take_along_axis(draws_with, everything, axis=1)
     above = n - below + as_many
-    return np.asarray(2.0 * np.minimum(below, above).min(axis=0) / n)
+    return 2.0 * np.minimum(below, above).min(axis=0) / n
 
 
 def _chain_scores(test: _HeldOutTest) -> tuple[Array, Array, float]:
@@ -315,7 +315,7 @@ def _hold_scores(test: _HeldOutTest) -> Array:
 def _log_mean(log_p: Array) -> Array:
     """(...) logarithm of the mean density over draws (..., n)."""
     finite = or_impossible(log_p)
-    return np.asarray(logsumexp(finite, axis=-1) - np.log(finite.shape[-1]))
+    return logsumexp(finite, axis=-1) - np.log(finite.shape[-1])
 
 
 def two_thirds(recorded: int) -> int:

@@ -78,7 +78,7 @@ def _figures(readings: Floats) -> list[list[float]]:
     return quantiles.T.tolist()
 
 
-def unlikely_readings(members: Members, seed: int = 0) -> list[Notice]:
+def unlikely_readings(members: Members, seed: int) -> list[Notice]:
     """A warning for every given first reading that is far from what is expected where it is not given.
 
     Parameters

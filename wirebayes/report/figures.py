@@ -228,7 +228,7 @@ def residual_figure(
     measured: Array,
     band: Array,
     title: str,
-    colour: str = CHAIN,
+    colour: str,
     paper_N: Array | None = None,
     unit: str = "N",
 ) -> Figure:

@@ -15,13 +15,12 @@ from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.io.unread_ends import unread_s
 from wirebayes.json_files.hold_ends import HoldEnds, MovedByHoldEnds
 from wirebayes.json_files.values import UNITS
-from wirebayes.model.column_units import unit_of_column
+from wirebayes.model.column_units import parameter_of, unit_of_column
 from wirebayes.model.linear_amplitudes import integrated
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array
 from wirebayes.result_warnings import Notice
-from wirebayes.results.parameters import parameter_of
 from wirebayes.sentences import holds_in_words, lasting, listed, number, unit_text
 from wirebayes.wire.protocol import Protocol
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from wirebayes.json_files.values import UNITS
+from wirebayes.model.column_units import parameter_of
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import LENGTH_EXPONENT, Sample
 from wirebayes.numeric.typing import Array
@@ -14,11 +15,6 @@ from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Control
-
-
-def parameter_of(column: str) -> str:
-    """The parameter that a column belongs to, whatever its sample or material."""
-    return column.split("[")[0]
 
 
 def variables(problem: Problem, theta: Array, sample: Sample | None) -> dict[str, Array]:

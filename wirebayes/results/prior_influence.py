@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from wirebayes.model.column_units import parameter_of
 from wirebayes.model.prior import Prior
 from wirebayes.model.sample import NOISES, SAMPLE
 from wirebayes.numeric.distributions import HalfCauchy, HalfNormal, LogitNormal, LogNormal, Normal, log_density_of, ours
 from wirebayes.numeric.typing import Array
 from wirebayes.result_warnings import Notice
-from wirebayes.results.parameters import parameter_of
 from wirebayes.sentences import listed
 
 WIDER = 2.0  # times as wide: a prior that two people may well disagree about

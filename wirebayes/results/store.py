@@ -38,12 +38,12 @@ def save_posterior(
     return save_summary(fit, folder, sample=sample)
 
 
-def save_summary(fit: Fit, folder: Path, *, sample: Sample | None = None) -> SummaryJson:
+def save_summary(fit: Fit, folder: Path, *, sample: Sample | None) -> SummaryJson:
     """Write ``summary.json`` alone, the same as `save_posterior` does, and return it.
 
     Parameters
     ----------
-    sample : Sample, optional
+    sample : Sample or None
         See `save_posterior`.
     """
     summary = summary_of(fit, _alone(fit, sample))

@@ -18,6 +18,7 @@ from wirebayes.io.readings import READ, SET, Hold
 from wirebayes.io.run_folder import write_csv, write_json, write_text
 from wirebayes.json_files.truth import TrueWire, TruthJson
 from wirebayes.model.build import build
+from wirebayes.model.column_units import parameter_of
 from wirebayes.model.problem import Problem, with_readings
 from wirebayes.model.replicate import rounded
 from wirebayes.model.sample import Sample
@@ -241,17 +242,17 @@ def _check_carried(sample: Sample, own: Theta, read: Array) -> None:
 
 def _middle_stiffness(truth: Truth) -> float:
     """The stiffness that a truth states, or a typical one, N."""
-    stated = [value for name, value in truth.parameters.items() if name.split("[")[0] == "k1" and value > 0]
+    stated = [value for name, value in truth.parameters.items() if parameter_of(name) == "k1" and value > 0]
     return geometric_mean(stated) if stated else TYPICAL_K1_N
 
 
 def _columns(problem: Problem, name: str, value: float) -> list[int]:
     """Columns of a parameter, one or one a sample, which may have the value."""
     names = problem.names
-    bare = name.split("[")[0]
+    bare = parameter_of(name)
     columns = []
     for i, column in enumerate(names):
-        if name in (column, column.split("[")[0]):
+        if name in (column, parameter_of(column)):
             columns.append(i)
     if not columns:
         meant = hint(name, names)

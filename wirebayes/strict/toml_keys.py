@@ -265,14 +265,14 @@ class Keys:
         return tables
 
 
-def line_of(text: str, key: str, index: int | None = None, kind: str = "experiment") -> int:
+def line_of(text: str, key: str, index: int | None, kind: str) -> int:
     """The line of a TOML file on which a key stands; of the innermost table found on the way to it otherwise.
 
     Parameters
     ----------
     key : str
         With the names of its tables, such as ``prior.k1.sd``.
-    index : int, optional
+    index : int or None
         The ``[[experiment]]`` to look in, from 0; without it the whole file.
     kind : str
         What such tables are called.

@@ -299,7 +299,7 @@ def own_effects_option(file: Path | None) -> str:
     return "" if file is None else f" --own-effects {typed(file)}"
 
 
-def next_prediction(results: Path, around: Path, options: str = "", file: str = NEXT_HOLD) -> str:
+def next_prediction(results: Path, around: Path, options: str, file: str = NEXT_HOLD) -> str:
     """The command that predicts the example of a hold to come.
 
     Parameters
@@ -317,6 +317,6 @@ def next_prediction(results: Path, around: Path, options: str = "", file: str = 
     return f"{command}  (one hold more: edit the file for others)"
 
 
-def next_pose(posterior: Path, options: str = "") -> str:
+def next_pose(posterior: Path, options: str) -> str:
     """The command that hangs a robot on such wires."""
     return f"wirebayes pose linear-7 --wires {typed(posterior)}{options}  (or the file of your own robot)"

@@ -236,6 +236,16 @@ class Effect:
         """Parameter names as they appear in a posterior: ``effect_name.parameter``."""
         return tuple(f"{self.name}.{a.name}" for a in self.amplitudes)
 
+    @property
+    def amplitude_column(self) -> str:
+        """The first of its columns: how strong the effect is."""
+        return self.columns()[0]
+
+    @property
+    def shape_columns(self) -> tuple[str, ...]:
+        """Its other columns: what else there is to know of the effect."""
+        return self.columns()[1:]
+
     def common_shapes(self) -> tuple[str, ...]:
         """Columns of the shape constants that all tests have alike."""
         shapes = zip(self.columns(), self.amplitudes, strict=True)
@@ -295,7 +305,7 @@ class Effect:
     def shapes_tried(self) -> list[dict[str, float]]:
         """Values of its shape constants, by column, at which an effect is looked for: quantiles of each."""
         tried: list[dict[str, float]] = [{}]
-        for name, shape in zip(self.columns()[1:], self.amplitudes[1:], strict=True):
+        for name, shape in zip(self.shape_columns, self.amplitudes[1:], strict=True):
             tried = [known | {name: float(v)} for known in tried for v in shape.prior.ppf([0.1, 0.5, 0.9])]
         return tried
 

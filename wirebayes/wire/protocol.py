@@ -190,7 +190,7 @@ def _widened(array: Any, columns: int) -> Any:
 def _log(times: Floats) -> Floats:
     """Logarithms of times; of none, minus infinity."""
     with np.errstate(divide="ignore"):
-        return np.asarray(np.log(times))
+        return np.log(times)
 
 
 def _directions(setting: Floats) -> Floats:

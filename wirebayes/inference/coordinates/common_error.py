@@ -42,11 +42,11 @@ class CommonError:
 
     def log_slope(self, theta: Array) -> Array:
         """(n,) log |d errors / d coordinates|."""
-        return np.asarray(-0.5 * np.log(self._precision(theta).sum(axis=0)))
+        return -0.5 * np.log(self._precision(theta).sum(axis=0))
 
     def _precision(self, theta: Array) -> Array:
         """(m, n) expected, one over the variance of each error."""
-        return np.asarray((self.weights / theta[:, self.setting].T) ** 2)
+        return (self.weights / theta[:, self.setting].T) ** 2
 
 
 def common_error(problem: Problem) -> CommonError | None:

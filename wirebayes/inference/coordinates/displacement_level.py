@@ -65,7 +65,7 @@ class DisplacementLevel:
         longer = self.length_exponent
         exponent = theta[:, longer] if isinstance(longer, int) else longer
         log_gained = self.ridge.log_creep(theta) + self.ridge.log_total(theta, self.holds)
-        return np.asarray(log_B + exponent * self.log_ratio + log_gained + np.log1p(self._strain(theta)))
+        return log_B + exponent * self.log_ratio + log_gained + np.log1p(self._strain(theta))
 
     def log_beyond(self, theta: Array, U: Array | float) -> Array:
         """(n,) log of what the readings show of a creep over the creep, which is stretched itself."""
@@ -84,7 +84,7 @@ class DisplacementLevel:
             Log of what the weight as stated has gained by creep until then, mm.
         """
         left = theta[:, self.preload] + self.last - self._stretch(theta) - np.exp(log_total)
-        return np.asarray(left / self.slope(theta, U, log_total))
+        return left / self.slope(theta, U, log_total)
 
     def value(self, score: Array, theta: Array, U: Array | float, log_total: Array) -> Array:
         """(n,) preloads, mm.
@@ -97,7 +97,7 @@ class DisplacementLevel:
             See `score`; the preload in `theta` is not looked at.
         """
         known = self._stretch(theta) + np.exp(log_total) - self.last
-        return np.asarray(known + self.slope(theta, U, log_total) * score)
+        return known + self.slope(theta, U, log_total) * score
 
     def log_gain(self, theta: Array, U: Array | float, score: Array) -> Array:
         """(n,) log of the creep that is read under the true weight over that under the stated one.
@@ -118,10 +118,10 @@ class DisplacementLevel:
             See `score`; the preload in `theta` is not looked at.
         """
         elastic = self._stretch(theta) * self._steepness(theta)
-        return np.asarray(elastic + self._power(theta, U) * np.exp(log_total))
+        return elastic + self._power(theta, U) * np.exp(log_total)
 
     def _stretch(self, theta: Array) -> Array:
-        return np.asarray(self.length * self._strain(theta))
+        return self.length * self._strain(theta)
 
     def _steepness(self, theta: Array) -> Array | float:
         """Derivative of the log strain by the log weight."""
@@ -130,7 +130,7 @@ class DisplacementLevel:
     def _power(self, theta: Array, U: Array | float) -> Array:
         """(n,) derivative of the log of the creep that is read by the log weight, which stretches it, too."""
         strain = self._strain(theta)
-        return np.asarray(U + strain / (1.0 + strain) * self._steepness(theta))
+        return U + strain / (1.0 + strain) * self._steepness(theta)
 
     def _strain(self, theta: Array) -> Array:
         """(n,) elongation under the weight over the length, before any creep."""

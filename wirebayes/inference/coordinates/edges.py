@@ -118,17 +118,17 @@ def _cut_off(known: TruncatedNormal) -> Edge:
         lower = ndtri(below + left * above)
         upper = -ndtri(right * above)
         found = middle + sd * np.where(score < 0.0, lower, upper)
-        return np.asarray(np.maximum(found, end))  # rounding may lead beyond
+        return np.maximum(found, end)  # rounding may lead beyond
 
     return Edge(score, value, known.log_density(), False)
 
 
 def _uniform(low: float, width: float, log_prior: Function) -> Edge:
     def score(value: Array) -> Array:
-        return np.asarray(ndtri(np.clip((value - low) / width, _NEAREST, 1.0 - _NEAREST)))
+        return ndtri(np.clip((value - low) / width, _NEAREST, 1.0 - _NEAREST))
 
     def value(score: Array) -> Array:
-        return np.asarray(low + width * ndtr(score))
+        return low + width * ndtr(score)
 
     return Edge(score, value, log_prior, True)
 
@@ -138,10 +138,10 @@ def _log_uniform(known: LogUniform) -> Edge:
 
     def score(value: Array) -> Array:
         share = np.log(value / known.low) / width
-        return np.asarray(ndtri(np.clip(share, _NEAREST, 1.0 - _NEAREST)))
+        return ndtri(np.clip(share, _NEAREST, 1.0 - _NEAREST))
 
     def value(score: Array) -> Array:
         found = known.low * np.exp(width * ndtr(score))
-        return np.asarray(np.minimum(found, known.high))  # rounding may lead beyond
+        return np.minimum(found, known.high)  # rounding may lead beyond
 
     return Edge(score, value, known.log_density(), True)

@@ -67,16 +67,16 @@ class FirstStretch:
     def score(self, theta: Array) -> Array:
         """(n,) scores of natural parameters (n, d)."""
         middle, width = self._expected(theta, *self._beginning(theta))
-        return np.asarray((theta[:, self.preload] - middle) / width)
+        return (theta[:, self.preload] - middle) / width
 
     def value(self, score: Array, theta: Array) -> Array:
         """(n,) preloads, mm, of scores beside the other natural parameters (n, d)."""
         middle, width = self._expected(theta, *self._beginning(theta))
-        return np.asarray(middle + width * score)
+        return middle + width * score
 
     def log_slope(self, theta: Array) -> Array:
         """(n,) log of the derivative of the preload by its score."""
-        return np.asarray(np.log(self._expected(theta, *self._beginning(theta))[1]))
+        return np.log(self._expected(theta, *self._beginning(theta))[1])
 
     def log_beyond(self, theta: Array, U: Array | float) -> Array:
         """(n,) log of what is lost in a hold over what its first reading drives in a wire that is hardly stretched.
@@ -89,7 +89,7 @@ class FirstStretch:
             Exponent of the tension.
         """
         stretched = np.log1p(self.read[-1] / self._k1(theta))
-        return np.asarray(stretched + U * np.log(self._extrapolated(theta) / self.read[0]))
+        return stretched + U * np.log(self._extrapolated(theta) / self.read[0])
 
     def log_gain(self, theta: Array, U: Array | float, score: Array) -> Array:
         """(n,) log of the creep that the likelihood has by the error over that which the true stretch drives.
@@ -107,7 +107,7 @@ class FirstStretch:
         middle, width = self._expected(theta, tension, len(self.read) ** -0.5)
         as_set = np.maximum((self.at + middle + width * score) / self._stretch(theta, tension), _LEAST)
         by_error = np.maximum(1.0 + U * (1.0 / as_set - 1.0), _LEAST)
-        return np.asarray(np.log(by_error) + U * np.log(as_set))
+        return np.log(by_error) + U * np.log(as_set)
 
     def _expected(self, theta: Array, tension: Array, share: Array | float) -> tuple[Array, Array]:
         """(n,) mean and standard deviation of the preload by readings and prior, mm.
@@ -134,7 +134,7 @@ class FirstStretch:
         strain = tension / self._k1(theta)
         if self.modified:
             strain = strain / np.maximum(1.0 - strain, _LEAST)
-        return np.asarray(self.length * strain)
+        return self.length * strain
 
     def _beginning(self, theta: Array) -> tuple[Array, Array]:
         """(n,) tension at the beginning that suits readings best, N; its standard deviation in those of a reading."""
@@ -173,7 +173,7 @@ class FirstStretch:
         """(n,) tension at the beginning by the first and the last reading and the course of the creep, N."""
         before, until = (self.ridge.reached(theta, time_s) for time_s in self.times_s[[0, -1]])
         lost = max(self.read[0] - self.read[-1], 0.0) * before / np.maximum(until - before, before / _MOST)
-        return np.asarray(self.read[0] + lost)
+        return self.read[0] + lost
 
     def _k1(self, theta: Array) -> Array:
         """(n,) stiffness, with a fixture where its compliance is sampled, N."""

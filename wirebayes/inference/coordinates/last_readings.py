@@ -77,7 +77,7 @@ class LastReadings:
         """(n,) mean of the elongations at last readings, mm: elastic, and by creep, which is stretched itself."""
         strain = self.tension[self.read, None] / self.ridge.get(theta, "k1")
         crept = self.ridge.get(theta, "B") * self._crept(theta)
-        return np.asarray((np.exp(self.ridge.log_length) * strain + crept * (1.0 + strain)).mean(axis=0))
+        return (np.exp(self.ridge.log_length) * strain + crept * (1.0 + strain)).mean(axis=0)
 
     def _crept(self, theta: Array) -> Array:
         """(h, n) elongation by creep until the last reading of each hold that was read, for B = 1."""

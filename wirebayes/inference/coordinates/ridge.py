@@ -14,14 +14,46 @@ from wirebayes.wire.effect import Effect, HoldContext, Placed
 
 @dataclass(frozen=True)
 class Ridge:
-    """Columns of one material's parameters (or fixed values), which of them are shifted, and what shifts them.
+    """One material's parameters, and what of its test shifts their coordinates.
 
-    `effects` are those on the amount of creep, and `holds` what they see of the test, tensions as measured. `powers`
-    are log hazards and the log U that suits the losses best at each of them. `fixture` is the column of a compliance in
-    series with the wire, and `beside` what creeps beside the creep. `elongations` where these are read, not tensions.
-
-    Of the distinct `times_s`, holds end at `which_end`; `between` are pairs of them, of a first and a last reading, and
-    `which_pair` is that of each hold.
+    Attributes
+    ----------
+    where : dict of str to int
+        Columns of the material's parameters that are sampled.
+    fixed : dict of str to float
+        Values of the others.
+    shifted : frozenset of str
+        Parameters that have another coordinate than their logarithm.
+    log_tension : (H,) array
+        Logarithm of the tension that drives the creep of each hold, as measured.
+    log_step : float
+        Logarithm of the root mean square of the steps of that tension.
+    times_s : (t,) array
+        The distinct times at which holds end, or have their first or last reading.
+    which_end : (H,) array of int
+        Which of the times is the end of each hold.
+    between : (k, 2) array of int
+        The distinct pairs of a first and a last reading.
+    which_pair : (H,) array of int
+        Which of the pairs is that of each hold.
+    kept : float
+        Share of the creep that is carried into the next hold: 1, or 0 where every hold creeps anew.
+    hold_s : float
+        How long a typical hold lasts.
+    log_length : float
+        Logarithm of the length, mm, that the creep belongs to.
+    effects : tuple of Effect
+        Those on the amount of creep.
+    holds : tuple of HoldContext
+        What these effects see of each hold, tensions as measured.
+    powers : (m,), (m,) arrays
+        Log hazards, and the log U that suits the losses best at each of them.
+    fixture : int or None
+        Column of a compliance in series with the wire.
+    beside : tuple of Elongation
+        What creeps beside the creep.
+    elongations : bool
+        Whether elongations are read, not tensions.
     """
 
     where: dict[str, int]
@@ -78,7 +110,7 @@ class Ridge:
         stiffness = np.log(self.get(theta, "k1")) - self.log_length
         if self.fixture is None:
             return stiffness
-        return np.asarray(stiffness - np.logaddexp(0.0, np.log(theta[:, self.fixture]) + stiffness))
+        return stiffness - np.logaddexp(0.0, np.log(theta[:, self.fixture]) + stiffness)
 
     def reached(self, theta: Array, time_s: Array | float) -> Array:
         """The share of its creep that a hold has reached after a time, (n,) or (T, n) for times (T, 1)."""
@@ -108,7 +140,7 @@ class Ridge:
         theta, z : (n, d) arrays
             Natural parameters, of which k1 and B are not looked at, and sampled coordinates.
         """
-        return np.asarray(z[:, self.where["B"]] - self.log_creep(theta))
+        return z[:, self.where["B"]] - self.log_creep(theta)
 
     def log_creep(self, theta: Array) -> Array:
         """(n,) log G: root mean square of the elongation that a hold shows, for B = 1, at natural parameters (n, d)."""
@@ -121,14 +153,14 @@ class Ridge:
         if self._all_is_seen:
             return 0.0
         gained, shown = self._squares(theta)
-        return np.asarray(0.5 * (np.log(np.maximum(gained, _NOTHING)) - np.log(np.maximum(shown, _NOTHING))))
+        return 0.5 * (np.log(np.maximum(gained, _NOTHING)) - np.log(np.maximum(shown, _NOTHING)))
 
     def log_total(self, theta: Array, holds: int) -> Array:
         """(n,) log of the elongation gained in the first holds together over the root mean square that a hold shows."""
         gained, shown = self._gained(self._drive(theta), *self._shares(theta), theta)
         total = gained[:holds].sum(axis=0)
         square = (shown**2).mean(axis=0)
-        return np.asarray(np.log(np.maximum(total, 1e-150)) - 0.5 * np.log(np.maximum(square, _NOTHING)))
+        return np.log(np.maximum(total, 1e-150)) - 0.5 * np.log(np.maximum(square, _NOTHING))
 
     @cached_property
     def _all_is_seen(self) -> bool:

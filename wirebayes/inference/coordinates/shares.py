@@ -64,7 +64,7 @@ class Elongation:
             square = square + gained**2
             carried = end
         mean_square = square / len(self.holds)
-        return np.asarray(0.5 * np.log(np.maximum(mean_square, 1e-300)))
+        return 0.5 * np.log(np.maximum(mean_square, 1e-300))
 
 
 def score(log_amount: Array, log_other: Array) -> Array:
@@ -95,4 +95,4 @@ def log_slope(amount: Array, scores: Array) -> Array:
     amount, scores : (n,) arrays
     """
     share, rest = log_shares(scores)
-    return np.asarray(np.log(amount) - share - rest - 0.5 * scores * scores - _NORMAL)
+    return np.log(amount) - share - rest - 0.5 * scores * scores - _NORMAL

@@ -163,7 +163,7 @@ class AddedCompliance(Step):
 
     def log_jacobian(self, theta: Array, z: Array) -> Array | float:
         column = self.ridge.where["k1"]
-        return np.asarray(np.log(theta[:, column]) - z[:, column])
+        return np.log(theta[:, column]) - z[:, column]
 
     def _of_creep(self, theta: Array, z: Array) -> Array:
         """(n,) strain by creep per tension, 1/N."""
@@ -267,7 +267,7 @@ class WeightLevel(Step):
     def _log_B(self, theta: Array, log_lost: Array) -> Array:
         """(n,) log B, by the log of what is gained in a hold, as if what creeps beside the creep were creep."""
         beyond = self.levels[0].log_beyond(theta, self.ridge.get(theta, "U"))
-        return np.asarray(log_lost - self.ridge.log_creep(theta) - beyond)
+        return log_lost - self.ridge.log_creep(theta) - beyond
 
 
 @dataclass(frozen=True)

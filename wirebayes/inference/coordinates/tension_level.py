@@ -48,7 +48,7 @@ class TensionLevel:
         """(n,) log of the tension at the beginning, of natural parameters (n, d) but for log k1 (n,)."""
         preload = theta[:, self.preload] if isinstance(self.preload, int) else self.preload
         stretch = np.maximum(1.0 + preload / self.at, _LEAST)
-        return np.asarray(log_k1 + np.log(self.at / self.length) + np.log(stretch))
+        return log_k1 + np.log(self.at / self.length) + np.log(stretch)
 
     def log_beyond(self, theta: Array, U: Array | float) -> Array:
         """(n,) log creep by which the tension at the beginning drives more than the first one that was read.
@@ -62,7 +62,7 @@ class TensionLevel:
         """
         with np.errstate(all="ignore"):
             driving = self.log_tension(theta, np.log(theta[:, self.k1]))
-        return np.asarray(U * (driving - np.log(self.first)))
+        return U * (driving - np.log(self.first))
 
     def log_expected(self, log_lost: Array, k2: Array | float, N: Array | float) -> Array | float:
         """(n,) log of the first reading and what was lost before it, which is the tension at the beginning.

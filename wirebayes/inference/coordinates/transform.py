@@ -70,6 +70,7 @@ from wirebayes.inference.coordinates.steps import (
     WeightLevel,
 )
 from wirebayes.inference.coordinates.tension_level import TensionLevel, tension_level
+from wirebayes.model.column_units import parameter_of
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import NOISES
 from wirebayes.numeric.typing import Array
@@ -121,27 +122,21 @@ class Transformation:
         names = problem.names
         self.problem = problem
         self.columns = columns_of(problem)
-        self.log_columns, self.scale = self.columns.positive, self.columns.scale
+        self.log_columns = self.columns.positive
+        self.scale = self.columns.scale
         self.noises = _noises(problem, self.columns)
         self.sensor_columns = _positive("sensor_sd", names, self.columns)
         self.setting_columns = _positive("setting_sd", names, self.columns)
         self.order = np.array(sorted(range(len(names)), key=lambda i: _rank(names[i])))
         slack = _slack_edges(problem, self.columns)
-        ridges = ridges_of(problem, self.columns)
-        levels: list[LevelStep] = []
-        if _is_usual(problem, self.columns, ridges):
-            ridge, levels = _of_one_setting(problem, ridges[0], slack, self.scale)
-            ridges = [ridge]
-        lasts: list[list[LastReadings]] = [[] for _ in ridges]
-        if not levels:
-            lasts = _last_readings(problem, ridges)
+        self.ridges, levels = _ridges_and_levels(problem, self.columns, slack)
+        lasts = [[] for _ in self.ridges] if levels else _last_readings(problem, self.ridges)
         means = _mean_elongations(problem, lasts, self.columns)
         of_levels = {column for step in levels if not isinstance(step, Level) for column in step.preloads}
         edges = [Preload(edge, self.scale[edge.preload]) for edge in slack if edge.preload not in of_levels]
         toes = _toes(problem, self.columns) if not of_levels else []
-        self.steps = [*_steps(ridges, lasts, levels, means, edges), *toes]
-        self.ridges = ridges
-        self.shares = [column for ridge in ridges for column in ridge.shares]
+        self.steps = [*_steps(self.ridges, lasts, levels, means, edges), *toes]
+        self.shares = [column for ridge in self.ridges for column in ridge.shares]
         preloads = of_levels | {step.preload for step in means} | {step.preload for step in toes}
         preloads |= {step.edge.preload for step in edges}
         self._own_scale = [*self.shares, *sorted(preloads)]
@@ -242,6 +237,17 @@ def _steps(
     steps += [Hazard(ridge) for ridge in ridges if "k2" in ridge.shifted]
     steps += [Power(ridge) for ridge in ridges if "U" in ridge.shifted]
     return steps + list(after)
+
+
+def _ridges_and_levels(
+    problem: Problem, columns: ColumnMap, slack: list[SlackEdge]
+) -> tuple[list[Ridge], list[LevelStep]]:
+    """The ridges of all materials, and the coordinates of tests at one setting each, if they are."""
+    ridges = ridges_of(problem, columns)
+    if not _is_usual(problem, columns, ridges):
+        return ridges, []
+    ridge, levels = _of_one_setting(problem, ridges[0], slack, columns.scale)
+    return [ridge], levels
 
 
 def _of_one_setting(
@@ -370,9 +376,9 @@ def _noises(problem: Problem, columns: ColumnMap) -> tuple[Noises, ...]:
 
 def _positive(kind: str, names: Sequence[str], columns: ColumnMap) -> list[int]:
     """Columns of a positive parameter, of every sample that has its own."""
-    return [i for i, name in enumerate(names) if columns.positive[i] and name.split("[")[0] == kind]
+    return [i for i, name in enumerate(names) if columns.positive[i] and parameter_of(name) == kind]
 
 
 def _rank(name: str) -> int:
-    kind = name.split("[")[0]
+    kind = parameter_of(name)
     return _FIRST.index(kind) - len(_FIRST) if kind in _FIRST else int(kind in _LAST)

@@ -168,9 +168,7 @@ def _frozen(
     return Sampling(settled.walkers, learned, state.generator, evaluations)
 
 
-def _with_excess(
-    state: BurnIn, z: Array, value: Array, log_weight: Array, left: WeightedPoints | None = None
-) -> BurnIn:
+def _with_excess(state: BurnIn, z: Array, value: Array, log_weight: Array, left: WeightedPoints | None) -> BurnIn:
     """The proposal with a part for what it makes too little of.
 
     Parameters
@@ -179,7 +177,7 @@ def _with_excess(
         Its places of earlier rounds are looked at, too.
     z, value, log_weight : arrays
         Places (n, d), their log densities and weights.
-    left : WeightedPoints, optional
+    left : WeightedPoints or None
         Places that the search left, with their log densities as one more column.
     """
     drawn = WeightedPoints.weighted(np.column_stack([z, value]), log_weight)

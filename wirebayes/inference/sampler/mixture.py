@@ -18,9 +18,15 @@ from wirebayes.numeric.typing import Array
 
 @dataclass(frozen=True)
 class Mixture:
-    """Weights ``(k,)``, centres ``(k, d)``, lower Cholesky factors ``(k, d, d)`` of the scales, degrees of freedom.
+    """A mixture of Student-t distributions.
 
-    These are one number for all components, or an array ``(k,)``.
+    Attributes
+    ----------
+    weights, centres : (k,), (k, d) arrays
+    factors : (k, d, d) array
+        Lower Cholesky factors of the scales.
+    degrees : float or (k,) array
+        Of freedom: one number for all components, or one each.
     """
 
     weights: Array
@@ -46,18 +52,17 @@ class Mixture:
         d = self.centres.shape[1]
         which = rng.choice(len(self.weights), size=n, p=self.weights)
         stretch = np.sqrt(self.degrees / rng.chisquare(self.degrees, size=n))
-        return self.centres[which] + stretch[:, None] * np.einsum(
-            "nij,nj->ni", self.factors[which], rng.standard_normal((n, d))
-        )
+        normal = rng.standard_normal((n, d))
+        from_centre = np.einsum("nij,nj->ni", self.factors[which], normal)
+        return self.centres[which] + stretch[:, None] * from_centre
 
     @property
     def moments(self) -> tuple[Array, Array]:
         """(d,) mean and (d, d) covariance; more than two degrees of freedom."""
         mean = self.weights @ self.centres
         apart = self.centres - mean
-        within = np.einsum(
-            "k,kij,klj->il", self.weights * self.degrees / (self.degrees - 2.0), self.factors, self.factors
-        )
+        variance = self.weights * self.degrees / (self.degrees - 2.0)
+        within = np.einsum("k,kij,klj->il", variance, self.factors, self.factors)
         return mean, within + np.einsum("k,ki,kj->ij", self.weights, apart, apart)
 
     @cached_property

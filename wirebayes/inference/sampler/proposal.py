@@ -176,7 +176,8 @@ def fit_proposal(
     hot = hot.thinned(points, rng)
     cold = cold.thinned(points, rng)
     elsewhere = before is None or (hot.spread > ELSEWHERE * cold.spread).any()
-    straight = transport_map.fit_map(hot if along_tails and not elsewhere else cold, order, scores)
+    to_fit = hot if along_tails and not elsewhere else cold
+    straight = transport_map.fit_map(to_fit, order, scores)
     near = _straightened(cold, straight)
     far = _straightened(hot, straight).thinned(points // 2, rng)
     plain = hot.thinned(points // 2, rng)

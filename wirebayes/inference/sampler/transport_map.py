@@ -221,14 +221,14 @@ def _coefficients(found: Sequence["_Straightened"]) -> dict[str, Array]:
     linear = np.zeros((d, d))
     quadratic = np.zeros((d, d, d))
     log_scale = np.zeros((d, d + 1))
-    for j, of in enumerate(found):
-        constant[j] = of.of_mean[0]
-        linear[j, :j] = of.of_mean[1 : j + 1]
-        of_pairs = of.of_mean[j + 1 :]
-        one, other = of.pairs
+    for j, own in enumerate(found):
+        constant[j] = own.of_mean[0]
+        linear[j, :j] = own.of_mean[1 : j + 1]
+        of_pairs = own.of_mean[j + 1 :]
+        one, other = own.pairs
         np.add.at(quadratic[j], (one, other), of_pairs)
         np.add.at(quadratic[j], (other, one), of_pairs)
-        log_scale[j, : j + 1] = of.of_scale
+        log_scale[j, : j + 1] = own.of_scale
     return {"constant": constant, "linear": linear, "quadratic": quadratic, "log_scale": log_scale}
 
 
@@ -296,7 +296,7 @@ def _seen_at_once(products: Array, lines: Array, y: Array, weight: Array, clear:
         return np.arange(0)
     root = np.sqrt(weight)[:, None]
     both = root * np.column_stack([products, y])
-    basis = np.linalg.qr(root * lines)[0]
+    basis, _ = np.linalg.qr(root * lines)
     left = both - basis @ (basis.T @ both)
     size = np.sqrt((left**2).sum(axis=0))
     size = np.maximum(size, 1e-300)
@@ -310,32 +310,32 @@ def _seen_at_once(products: Array, lines: Array, y: Array, weight: Array, clear:
 
 
 def _regress(
-    terms: Array, lines: Array, y: Array, points: Array, of_scale: Array | None = None
+    terms: Array, lines: Array, y: Array, weight: Array, of_scale: Array | None = None
 ) -> tuple[Array, Array, Array]:
     """Coefficients of the mean and of the log scale of y, each fitted in turn given the other; the mean's t values.
 
-    `points` (n,) are weights of the rows, `of_scale` is what the log scale is sought from.
+    `weight` (n,) is that of the rows, `of_scale` is what the log scale is sought from.
     """
-    worth = points.sum()
+    worth = weight.sum()
     if of_scale is None:
         of_scale = np.zeros(lines.shape[1])
     prior = _weak_prior(terms, worth)
-    information = 2.0 * (lines.T * points) @ lines
+    information = 2.0 * (lines.T * weight) @ lines
     information = information + _weak_prior(lines, worth)
     for _ in range(ALTERNATIONS):
         precision = _precision(lines, of_scale)
-        weighted = terms.T * _of_worth(points * precision, worth)
+        weighted = terms.T * _of_worth(weight * precision, worth)
         of_mean = np.linalg.solve(weighted @ terms + prior, weighted @ y)
         # a point far out says where the scale grows, but no single one decides
         square = np.minimum((y - terms @ of_mean) ** 2 * precision, 9.0)
-        slope = lines.T @ (points * (square - 1.0))
+        slope = lines.T @ (weight * (square - 1.0))
         step = np.linalg.solve(information, slope)
         of_scale = of_scale + step
         moved = lines @ step
-        if points @ moved**2 < SETTLED**2 * worth:
+        if weight @ moved**2 < SETTLED**2 * worth:
             break
-    weight = _of_worth(points * _precision(lines, of_scale), worth)
-    errors = _standard_errors(terms, y - terms @ of_mean, weight, worth)
+    by_scale = _of_worth(weight * _precision(lines, of_scale), worth)
+    errors = _standard_errors(terms, y - terms @ of_mean, by_scale, worth)
     return of_mean, of_scale, of_mean / errors
 
 

@@ -88,7 +88,7 @@ def as_experiment(
     about: About,
     resolution: float | None,
     control: Control,
-    unrecorded: Sequence[Entry] = (),
+    unrecorded: Sequence[Entry],
 ) -> Experiment:
     """The experiment checked as the reader of files checks its own, blaming the raw file's lines.
 

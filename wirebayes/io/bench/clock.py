@@ -332,7 +332,7 @@ def _falls(moments: _Moments, leading: float) -> int:
     return int(np.sum(np.diff(times) < 0.0))
 
 
-def _days(table: RawTable, column: int, moments: _Moments, unit: Unit | None = None) -> Floats:
+def _days(table: RawTable, column: int, moments: _Moments, unit: Unit | None) -> Floats:
     """Seconds from the beginning of the calendar to each date."""
     stated = None if unit is None or unit.clock is None else unit.clock.day_first
     day_first = _day_first(table, column, moments) if stated is None else stated

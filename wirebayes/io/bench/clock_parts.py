@@ -101,7 +101,7 @@ def _are_of_one_name(table: RawTable, columns: Sequence[int]) -> bool:
     Minutes without hours before them have more than one letter: m and mm are lengths, and m a mass.
     """
     headers = [table.header[i] for i in columns]
-    bare = {name_and_unit(header, "time")[0] for header in headers}
+    bare = {name_and_unit(header, "time").name for header in headers}
     names = {name for name in bare if not any(unit.fullmatch(name) for unit in _CLOCK.values())}
     are_lengths = quantity_unit(headers[0], "displacement") is not None and headers[1].lower() != "ss"
     return len(names) <= 1 and not are_lengths

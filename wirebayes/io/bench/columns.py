@@ -173,7 +173,7 @@ def _without_copies(table: RawTable, likely: Sequence[int]) -> list[int]:
 
 def _without_errors(table: RawTable, likely: Sequence[int], role: Role) -> list[int]:
     """The columns without those that say the error of another one: ``Force error (N)`` beside ``Force (N)``."""
-    words = {i: words_in(name_and_unit(table.header[i], role)[0]) for i in likely}
+    words = {i: words_in(name_and_unit(table.header[i], role).name) for i in likely}
     of_error = [i for i in likely if any(words[k] < words[i] and words[i] - words[k] <= ERRORS for k in likely)]
     return [i for i in likely if i not in of_error]
 
@@ -330,7 +330,7 @@ def _several(table: RawTable, likely: Sequence[int], role: Role, how: str = "") 
 
 def _option(table: RawTable, unread: Sequence[int], role: Role) -> str:
     """What to write for a missing quantity: the column in a unit of it, if there is one; it is the user who decides."""
-    likely = [i for i in unread if quantity_unit(table.units[i], role) or name_and_unit(table.header[i], role)[1]]
+    likely = [i for i in unread if quantity_unit(table.units[i], role) or name_and_unit(table.header[i], role).unit]
     likely = likely or [i for i in unread if quantity_unit(table.header[i], role)]  # named by nothing but its unit
     if len(likely) == 1:
         return f'--map "{table.header[likely[0]]}={role}"'

@@ -19,7 +19,7 @@ _WORD = re.compile(r"(?<![^\W\d_])(?!nan|null|none)[^\W\d_]{3,}", re.IGNORECASE)
 WHERE_MISSING = "; where a reading is missing, delete its row, or leave all such rows out by --drop-breaks"
 
 
-def complete_rows(table: RawTable, columns: Columns, drop_breaks: bool = False) -> tuple[RawTable, list[str]]:
+def complete_rows(table: RawTable, columns: Columns, drop_breaks: bool) -> tuple[RawTable, list[str]]:
     """Without rows that hold nothing of what is read, exact repetitions, and empty cells of a hold's later rows.
 
     Parameters

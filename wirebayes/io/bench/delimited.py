@@ -33,7 +33,7 @@ _SEPARATOR = re.compile(
 )  # the first line that Excel writes and obeys
 
 
-def sheet_of_text(path: Path, text: str, encoding: str = "utf-8") -> Sheet:
+def sheet_of_text(path: Path, text: str, encoding: str) -> Sheet:
     """Split text into cells.
 
     Parameters

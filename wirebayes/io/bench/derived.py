@@ -42,7 +42,7 @@ def check_itself(table: RawTable, index: int, role: Role, unit: Unit) -> None:
     Undecided
     """
     header = table.header[index]
-    name = name_and_unit(header, role)[0]
+    name = name_and_unit(header, role).name
     map_to = f"--map {header}={role}"
     as_it_is = f"{map_to} [{unit.text}]"
     where = table.where(table.header_line, index)

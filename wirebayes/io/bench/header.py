@@ -1,6 +1,7 @@
 """What a column's header and unit say of the quantity in it."""
 
 import re
+from typing import NamedTuple
 
 from wirebayes.io.bench.compound_times import announced
 from wirebayes.io.bench.multiples import unit_in_header
@@ -41,7 +42,7 @@ def is_of_sample(table: RawTable, index: int, role: Role) -> bool:
     role : str
         The quantity.
     """
-    unit = unit_in_header(table.units[index], role) or name_and_unit(table.header[index], role)[1]
+    unit = unit_in_header(table.units[index], role) or name_and_unit(table.header[index], role).unit
     return unit is not None and unit.of_sample
 
 
@@ -63,7 +64,14 @@ def header_meant(mapping: str) -> str:
     return mapping.rpartition("=")[0].strip()
 
 
-def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
+class NameAndUnit(NamedTuple):
+    """A header taken apart; None where it holds no unit."""
+
+    name: str
+    unit: Unit | None
+
+
+def name_and_unit(header: str, role: Role) -> NameAndUnit:
     """A header without its unit, and the unit: in brackets, after a slash, a comma, ``in``, ``_``, a point or a space.
 
     A time may begin with its unit in full: hours at load.
@@ -71,35 +79,38 @@ def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
     bracket = UNIT_IN_BRACKETS.match(header)
     in_brackets = unit_in_header(_IN.sub("", bracket[2]), role) if bracket else None
     if bracket and in_brackets:
-        return bracket[1], in_brackets
+        return NameAndUnit(bracket[1], in_brackets)
     found = _unit_in_a_bracket(header, role)
     if found is not None:
         return found
     if bracket and not any(unit_in_header(bracket[2], other) for other in ROLES):  # Force, N (serial number 7)
         name, unit = name_and_unit(bracket[1], role)
         if unit:
-            return f"{name} ({bracket[2]})", unit
+            return NameAndUnit(f"{name} ({bracket[2]})", unit)
     for sign in _BEFORE_UNIT.finditer(header):
         unit = unit_in_header(header[sign.end() :], role)
         name = header[: sign.start()]
         if unit and name and not _DIVIDED.search(name):
-            return name, unit
+            return NameAndUnit(name, unit)
     if role != "time":
-        return header, None
+        return NameAndUnit(header, None)
     clock = announced(header)
     if clock:
-        return header, Unit(header, clock=clock)
+        return NameAndUnit(header, Unit(header, clock=clock))
     first = _UNIT_FIRST.match(header)
-    return header, quantity_unit(first[1], role) if first else None
+    unit = quantity_unit(first[1], role) if first else None
+    return NameAndUnit(header, unit)
 
 
-def _unit_in_a_bracket(header: str, role: Role) -> tuple[str, Unit] | None:
+def _unit_in_a_bracket(header: str, role: Role) -> NameAndUnit | None:
     """A header without the first of its brackets that holds a unit, and the unit: ``Force (N) run 1``."""
     for inside in _BRACKET.finditer(header):
         unit = unit_in_header(inside[1].strip(), role)
-        before, behind = header[: inside.start()], header[inside.end() :]
+        before = header[: inside.start()]
+        behind = header[inside.end() :]
         if unit and before and not _OPERATOR.match(behind):
-            return f"{before.strip()} {behind.strip()}".strip(), unit
+            name = f"{before.strip()} {behind.strip()}".strip()
+            return NameAndUnit(name, unit)
     return None
 
 
@@ -135,7 +146,7 @@ def may_be(table: RawTable, index: int, role: Role) -> bool:
             return last_named(header) == role
     if role not in units:
         return speaks_of(header, role)
-    name = name_and_unit(header, role)[0]
+    name = name_and_unit(header, role).name
     if speaks_of(name, role):
         return True
     if units[role].of_sample and not words_in(name).isdisjoint(SAMPLE_WORDS[role]):
@@ -153,7 +164,7 @@ def _units_of(header: str, row_unit: str) -> dict[Role, Unit]:
     units: dict[Role, Unit] = {}
     for role in ROLES:
         in_row = unit_in_header(row_unit, role) if row_unit else None
-        unit = in_row or name_and_unit(header, role)[1]
+        unit = in_row or name_and_unit(header, role).unit
         if unit:
             units[role] = unit
     return units

@@ -249,4 +249,4 @@ def _form_of_dates(table: RawTable, column: int, mapping: Sequence[str]) -> Unit
     for _, role, stated in mapped_columns(table, about):
         if role == "time" and stated:
             return quantity_unit(stated, "time")
-    return name_and_unit(header, "time")[1]
+    return name_and_unit(header, "time").unit

@@ -25,14 +25,14 @@ _SIGNS: dict[Decimal, str] = {"comma": ",", "point": "."}
 _OTHER: dict[Decimal, Decimal] = {"comma": "point", "point": "comma"}
 
 
-def decimal_sign(table: RawTable, columns: Sequence[int], stated: Decimal | None = None) -> Decimal:
+def decimal_sign(table: RawTable, columns: Sequence[int], stated: Decimal | None) -> Decimal:
     """The decimal sign of a table.
 
     Parameters
     ----------
     columns : sequence of int
         Those of which numbers are read.
-    stated : {"point", "comma"}, optional
+    stated : {"point", "comma"} or None
         What the user says.
 
     Raises

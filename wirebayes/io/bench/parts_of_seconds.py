@@ -41,7 +41,7 @@ def with_whole_seconds(table: RawTable, mapping: Sequence[str]) -> RawTable:
 def _parts(table: RawTable, column: int) -> int:
     """How many of what a column counts make a second; 0 where it counts something else."""
     header, under = table.header[column].strip(), table.units[column]
-    unit = name_and_unit(header, "time")[1]
+    unit = name_and_unit(header, "time").unit
     words = re.split(r"[\s._/()\[\]]+", header.rstrip(")] "))
     for text in (under, unit.text if unit else "", words[-1]):
         for parts, names in _UNITS.items():

@@ -198,7 +198,7 @@ def _name_of_cells(table: RawTable, across: _Across, read: Role) -> tuple[str, s
     units = {table.units[i] for i in across.values}
     stated = units.pop() if len(units) == 1 else ""
     above = {table.above[i] for i in across.values if i < len(table.above)} - {""}
-    of_quantity = (text for text in (across.cells, *above) if name_and_unit(text, read)[1])
+    of_quantity = (text for text in (across.cells, *above) if name_and_unit(text, read).unit)
     name = next(of_quantity, read)
     return name, stated if quantity_unit(stated, read) else ""
 

@@ -39,7 +39,7 @@ def finest_of_same(table: RawTable, likely: Sequence[int], role: Role) -> list[i
         return [*likely]
     first, step, _ = columns[0]
     steps = [own for _, own, _ in columns]
-    names = {name_and_unit(table.header[i], role)[0].strip().lower() for i in likely}
+    names = {name_and_unit(table.header[i], role).name.strip().lower() for i in likely}
     if len(names) > 1 and max(steps) > FINE * np.ptp(first):
         return [*likely]
     if len(set(first)) < FEWEST:
@@ -55,7 +55,7 @@ def finest_of_same(table: RawTable, likely: Sequence[int], role: Role) -> list[i
 
 def _converted(table: RawTable, column: int, role: Role) -> tuple[Floats, float, float] | None:
     """Numbers in our unit, the step to which they are written, and the unit's factor; None where they are not plain."""
-    unit = unit_in_header(table.units[column], role) or name_and_unit(table.header[column], role)[1]
+    unit = unit_in_header(table.units[column], role) or name_and_unit(table.header[column], role).unit
     cells = [cell.replace(",", ".") for cell in table.column(column)]
     if unit is None or unit.of_sample or unit.offset:
         return None

@@ -100,7 +100,7 @@ def units_alone(table: RawTable, needed: Sequence[Role], columns: Collection[int
 def _has_unit_of(table: RawTable, index: int, role: Role) -> bool:
     """Whether a column's name is, holds or stands above a unit of a quantity."""
     header = table.header[index]
-    in_name = quantity_unit(header.strip("[]() "), role) or name_and_unit(header, role)[1]
+    in_name = quantity_unit(header.strip("[]() "), role) or name_and_unit(header, role).unit
     return bool(in_name or unit_in_header(table.units[index], role))
 
 

@@ -16,7 +16,7 @@ SIGNATURE = b"PK\x03\x04"
 OLD_EXCEL = b"\xd0\xcf\x11\xe0"
 
 
-def sheet_of_workbook(path: Path, raw: bytes, chosen: str | None = None) -> Sheet:
+def sheet_of_workbook(path: Path, raw: bytes, chosen: str | None) -> Sheet:
     """The cells of the sheet that holds readings, or of the one named.
 
     Raises
@@ -30,7 +30,7 @@ def sheet_of_workbook(path: Path, raw: bytes, chosen: str | None = None) -> Shee
         Named in messages.
     raw : bytes
         Content of the file.
-    chosen : str, optional
+    chosen : str or None
         Name of a sheet; left out, the only one with readings is taken.
     """
     rows = _rows_of_sheets(path, raw)

@@ -80,51 +80,51 @@ def _import_page(folder: Path, files: Section) -> Page:
     return Page("What was imported", f"{lead}.", [*sections, files])
 
 
-def _imported(e: ImportedExperiment, picture: list[Block]) -> list[Block]:
+def _imported(experiment: ImportedExperiment, picture: list[Block]) -> list[Block]:
     about = [
-        f"From {e['raw']}.",
-        f"{counted(e['holds'], 'hold')}, {counted(e['readings'], 'reading')}.",
-        f"Length {number(e['length_mm'])} mm.",
+        f"From {experiment['raw']}.",
+        f"{counted(experiment['holds'], 'hold')}, {counted(experiment['readings'], 'reading')}.",
+        f"Length {number(experiment['length_mm'])} mm.",
     ]
-    done = [f"{note[:1].upper()}{note[1:]}." for note in e["notes"]]
+    done = [f"{note[:1].upper()}{note[1:]}." for note in experiment["notes"]]
     columns = [Points("What it is", about), Points("What was done", done or ["Nothing had to be decided."])]
-    return [*before_the_answer(e), *picture, *beside_the_answer(e), Columns(columns)]
+    return [*before_the_answer(experiment), *picture, *beside_the_answer(experiment), Columns(columns)]
 
 
-def _checked(e: CheckedExperiment, picture: list[Block]) -> list[Block]:
-    known = Points("What it is", _about(e))
-    blind = Points("What it cannot determine", _blind(e))
+def _checked(experiment: CheckedExperiment, picture: list[Block]) -> list[Block]:
+    known = Points("What it is", _about(experiment))
+    blind = Points("What it cannot determine", _blind(experiment))
     return [
-        *before_the_answer(e),
+        *before_the_answer(experiment),
         *picture,
-        *beside_the_answer(e),
+        *beside_the_answer(experiment),
         Columns([known, blind]),
-        _parameters(e),
-        _effects(e),
-        _holds(e),
+        _parameters(experiment),
+        _effects(experiment),
+        _holds(experiment),
     ]
 
 
-def _about(e: CheckedExperiment) -> list[str]:
+def _about(experiment: CheckedExperiment) -> list[str]:
     """The sample and the test in sentences."""
-    holds = counted(e["recorded_holds"], "recorded hold")
-    if e["unrecorded_holds"]:
-        holds += f", {e['unrecorded_holds']} unrecorded"
+    holds = counted(experiment["recorded_holds"], "recorded hold")
+    if experiment["unrecorded_holds"]:
+        holds += f", {experiment['unrecorded_holds']} unrecorded"
     about = [
-        f"{e['material']}, {number(e['length_mm'])} mm.",
-        f"{holds}, {counted(e['readings'], 'reading')}.",
-        f"{number(e['duration_s'] / 60.0)} min in all.",
+        f"{experiment['material']}, {number(experiment['length_mm'])} mm.",
+        f"{holds}, {counted(experiment['readings'], 'reading')}.",
+        f"{number(experiment['duration_s'] / 60.0)} min in all.",
     ]
-    ends = e.get("hold_ends")
-    if ends and not warns_of(e, "hold-ends"):
+    ends = experiment.get("hold_ends")
+    if ends and not warns_of(experiment, "hold-ends"):
         about.append(as_sentence(ends["sentence"]))
     return about
 
 
-def _blind(e: CheckedExperiment) -> list[str]:
+def _blind(experiment: CheckedExperiment) -> list[str]:
     """Effects that the test cannot show, and parameters that it does not determine."""
-    hidden = [spoken(name) for name, effect in e["effects"].items() if effect["shows"] == "no"]
-    prior = [name for name, parameter in e["parameters"].items() if parameter["determined_by"] == "prior"]
+    hidden = [spoken(name) for name, effect in experiment["effects"].items() if effect["shows"] == "no"]
+    prior = [name for name, parameter in experiment["parameters"].items() if parameter["determined_by"] == "prior"]
     blind = []
     if hidden:
         blind.append(f"Effects it cannot show: {', '.join(hidden)}.")
@@ -133,10 +133,10 @@ def _blind(e: CheckedExperiment) -> list[str]:
     return blind or ["Nothing to report."]
 
 
-def _parameters(e: CheckedExperiment) -> Table:
+def _parameters(experiment: CheckedExperiment) -> Table:
     """What is known of each parameter before and after the test."""
     rows = []
-    for name, parameter in e["parameters"].items():
+    for name, parameter in experiment["parameters"].items():
         rows.append(
             [
                 name,
@@ -152,10 +152,10 @@ def _parameters(e: CheckedExperiment) -> Table:
     return Table(header, rows, "A first estimate by a short run of the sampler; fit gives the posterior.")
 
 
-def _effects(e: CheckedExperiment) -> Table:
+def _effects(experiment: CheckedExperiment) -> Table:
     """How small an effect the test would show."""
     rows = []
-    for name, effect in e["effects"].items():
+    for name, effect in experiment["effects"].items():
         if effect["shows"] != "no":
             amplitude = number(effect["amplitude_80"])
             rows.append([spoken(name), amplitude, unit_or_dash(effect["unit"]), effect["shows"]])
@@ -163,12 +163,12 @@ def _effects(e: CheckedExperiment) -> Table:
     return Table(["effect", "amplitude", "unit", "shows"], rows, caption)
 
 
-def _holds(e: CheckedExperiment) -> Table:
+def _holds(experiment: CheckedExperiment) -> Table:
     """The holds, a row each."""
-    weights = e["control"] == "force"
+    weights = experiment["control"] == "force"
     what, unit = ("weight (N)", "mm") if weights else ("displacement (mm)", "N")
     rows = []
-    for hold in e["holds"]:
+    for hold in experiment["holds"]:
         rows.append(
             [
                 str(hold["number"] or NONE),

@@ -88,41 +88,41 @@ _NEAREST = (
 _TERMS = ("hold", "90 % interval", "p", "held out", "rms", "elpd", "in the 90 % band", "gap closed")
 
 
-def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
+def _section(folder: Path, name: str, found: ExperimentFindings) -> Section:
     hidden = []
-    for sentence in v.get("not_identifiable", []):
+    for sentence in found.get("not_identifiable", []):
         what, _, why = sentence.partition(": ")
         hidden.append([spoken(what), why])
-    blocks: list[Block] = before_the_answer(v)
-    blocks += _alone(v)
-    blocks += beside_the_answer(v)
+    blocks: list[Block] = before_the_answer(found)
+    blocks += _alone(found)
+    blocks += beside_the_answer(found)
     blocks += _curves(folder, name)
-    if v["verdict"] in ("named", "nothing-missing"):
+    if found["verdict"] in ("named", "nothing-missing"):
         blocks.append(Text(USE))
-    measure_next = v.get("next_measurement")
+    measure_next = found.get("next_measurement")
     if measure_next:
         blocks.append(Text(f"Measure next: {measure_next}"))
     own = folder / name
-    blocks += _parameters(own, v)
-    blocks.append(_within_a_minute(v, [what for what, _ in hidden]))
-    blocks += _patterns(own, v)
-    steps = v.get("steps", [])
+    blocks += _parameters(own, found)
+    blocks.append(_within_a_minute(found, [what for what, _ in hidden]))
+    blocks += _patterns(own, found)
+    steps = found.get("steps", [])
     if len(steps) > 1 and read_value(steps[0], "rmse") is not None:
-        blocks += _steps(v)
-    if v.get("probabilities"):
-        blocks.append(_candidates(v))
-    if v.get("power"):
-        blocks.append(_power(v))
+        blocks += _steps(found)
+    if found.get("probabilities"):
+        blocks.append(_candidates(found))
+    if found.get("power"):
+        blocks.append(_power(found))
     if hidden:
         caption = "What this test cannot show: the readings would be nearly the same with or without it."
         blocks.append(Table(["what", "why"], hidden, caption))
     return Section(name, blocks)
 
 
-def _power(v: ExperimentFindings) -> Table:
+def _power(found: ExperimentFindings) -> Table:
     """How small an effect such a test would show."""
     lines = []
-    for effect, power in v["power"].items():
+    for effect, power in found["power"].items():
         lines.append([spoken(effect), number(power["amplitude_80"]), unit_or_dash(power["unit"])])
     caption = "The smallest size of each effect that four of five such tests would show; a dash: none, or no unit."
     return Table(["effect", "size", "unit"], lines, caption)
@@ -136,35 +136,35 @@ def _curves(folder: Path, name: str) -> list[Block]:
     return [Pictures([Picture(embedded(file), alt, _BEFORE_AND_AFTER, wide=True)])]
 
 
-def _within_a_minute(v: ExperimentFindings, hidden: list[str]) -> Columns:
+def _within_a_minute(found: ExperimentFindings, hidden: list[str]) -> Columns:
     """Where model and measurement disagree, what is known, and what is not."""
-    known = [f"{line[0].upper()}{line[1:]}." for line in said_beside(v)]
-    known += [*_held_out(v), *_sizes(v)]
-    unknown = [_NEAREST] if v.get("effects") else []
+    known = [f"{line[0].upper()}{line[1:]}." for line in said_beside(found)]
+    known += [*_held_out(found), *_sizes(found)]
+    unknown = [_NEAREST] if found.get("effects") else []
     if hidden:
         unknown.append(f"This test cannot show {listed(hidden)}.")
     return Columns(
         [
-            Points("Where model and measurement disagree", _disagreements(v)),
+            Points("Where model and measurement disagree", _disagreements(found)),
             Points("What is known", known or ["Nothing had to be added to the plain model."]),
             Points("What is not known", unknown or ["Nothing to report."]),
         ]
     )
 
 
-def _disagreements(v: ExperimentFindings) -> list[str]:
+def _disagreements(found: ExperimentFindings) -> list[str]:
     """The residual patterns that chance alone would rarely make, and what they amount to where nothing is missing."""
-    patterns = [pattern["sentence"] for pattern in v.get("where", []) if pattern["p"] <= _SPEAKS]
+    patterns = [pattern["sentence"] for pattern in found.get("where", []) if pattern["p"] <= _SPEAKS]
     if not patterns:
         return ["No pattern stands out."]
-    if v["verdict"] == "nothing-missing":
-        patterns.append(f"One pattern of several may stand out by chance; the global test decides ({_p(v)}).")
+    if found["verdict"] == "nothing-missing":
+        patterns.append(f"One pattern of several may stand out by chance; the global test decides ({_p(found)}).")
     return patterns
 
 
-def _steps(v: ExperimentFindings) -> list[Block]:
+def _steps(found: ExperimentFindings) -> list[Block]:
     """How well held-out holds are predicted, by the plain model and with each effect in turn."""
-    steps = v["steps"]
+    steps = found["steps"]
     falling = (
         "Rms error on held-out holds: of the plain model, by how much each named effect reduces it in turn, and "
         "what is left above the noise."
@@ -178,14 +178,14 @@ def _steps(v: ExperimentFindings) -> list[Block]:
         lines.append([name, error, number(step["elpd"]), percent(step["coverage_90"])])
     header = ["model", f"rms error ({unit_read(steps[0])})", "elpd", "readings in 90 % bands"]
     caption = "Prediction of the held-out holds from the others, by the plain model and with each effect in turn."
-    picture = Picture(drawn(waterfall(v)), falling, falling)
+    picture = Picture(drawn(waterfall(found)), falling, falling)
     return [Pictures([picture]), Table(header, lines, caption)]
 
 
-def _candidates(v: ExperimentFindings) -> Table:
+def _candidates(found: ExperimentFindings) -> Table:
     """The probability of each effect to be missing, the most probable first."""
-    inclusion = v.get("inclusion", {})
-    probabilities = v["probabilities"].items()
+    inclusion = found.get("inclusion", {})
+    probabilities = found["probabilities"].items()
     ranked = sorted(probabilities, key=lambda item: -item[1])
     lines = []
     for effect, p in ranked:
@@ -195,22 +195,22 @@ def _candidates(v: ExperimentFindings) -> Table:
         "First column: probability of having the largest share of the misfit, given that something is missing. "
         "Second: probability of being missing at all, alone or beside others."
     )
-    rest = v.get("remainder", {}).get("probability")
+    rest = found.get("remainder", {}).get("probability")
     if rest is not None:
         caption += f" Something that none of them explains remains with a probability of {percent(rest)}."
     return Table(["candidate", "largest share", "missing at all"], lines, caption)
 
 
-def _p(v: ExperimentFindings) -> str:
-    return "–" if v["p_global"] is None else p_in_words(v["p_global"], v["p_simulations"])
+def _p(found: ExperimentFindings) -> str:
+    return "–" if found["p_global"] is None else p_in_words(found["p_global"], found["p_simulations"])
 
 
-def _alone(v: ExperimentFindings) -> list[Block]:
+def _alone(found: ExperimentFindings) -> list[Block]:
     """A note that other effects look alike here, if they do: a headline that hides them would promise too much."""
-    if v["verdict"] not in ("named", "ambiguous"):
+    if found["verdict"] not in ("named", "ambiguous"):
         return []
-    named = {*v["effects"], *v["set"], "unknown"}
-    alike = [spoken(effect) for effect in v.get("group", []) if effect not in named]
+    named = {*found["effects"], *found["set"], "unknown"}
+    alike = [spoken(effect) for effect in found.get("group", []) if effect not in named]
     if not alike:
         return []
     return [Text(f"On this protocol hard to distinguish from {listed(alike)}.", strong=True)]
@@ -229,13 +229,13 @@ def _has_parameters(folder: Path) -> bool:
     return all((folder / model / "summary.json").is_file() for model in ("plain", "final"))
 
 
-def _parameters(folder: Path, v: ExperimentFindings) -> list[Block]:
+def _parameters(folder: Path, found: ExperimentFindings) -> list[Block]:
     """Every parameter before and after what was found joined the model."""
     if not _has_parameters(folder):
         return []
     plain = _parameters_of(folder / "plain")
     final = _parameters_of(folder / "final")
-    if v["verdict"] == "nothing-missing":
+    if found["verdict"] == "nothing-missing":
         return [_plain_parameters(plain)]
     rows = []
     for name, after in final.items():
@@ -272,23 +272,23 @@ _BEFORE_AND_AFTER = (
 )
 
 
-def _patterns(folder: Path, v: ExperimentFindings) -> list[Block]:
+def _patterns(folder: Path, found: ExperimentFindings) -> list[Block]:
     """The picture of each pattern; what is to be seen in it stands under where the two disagree."""
     if not folder.is_dir():
         return []
     captions = {}
-    for pattern in v.get("where", []):
+    for pattern in found.get("where", []):
         covariate = pattern["covariate"]
         captions[f"where-{covariate.replace(' ', '-')}"] = f"Residuals of the plain model by {covariate}."
     pictures = pictures_in(folder, captions)
     return [Pictures(pictures)] if pictures else []
 
 
-def _held_out(v: ExperimentFindings) -> list[str]:
+def _held_out(found: ExperimentFindings) -> list[str]:
     """How much the error on held-out holds changes; nothing where it says nothing."""
-    held = v.get("held_out") or {}
+    held = found.get("held_out") or {}
     plain, final = held.get("plain"), held.get("final")
-    if not plain or not final or v["verdict"] == "nothing-missing":
+    if not plain or not final or found["verdict"] == "nothing-missing":
         return []
     if not held["holds"]:
         return ["No hold was held out: that needs three recorded holds of every test."]
@@ -298,19 +298,19 @@ def _held_out(v: ExperimentFindings) -> list[str]:
     holds = listed([str(hold) for hold in held["holds"]])
     unit = unit_read(plain)
     text = f"On the held-out holds {holds} the rms error {goes} from {before} to {after} {unit}"
-    if v["verdict"] == "partial":
+    if found["verdict"] == "partial":
         text += " with a smooth discrepancy beside the named effects"
     flexible = held.get("flexible")
-    if v.get("accepted") and flexible:
+    if found.get("accepted") and flexible:
         reached = number(read_value(flexible, "rmse"), 2)
         text += f"; a smooth curve instead of a named effect reaches {reached} {unit}"
     return [f"{text}."]
 
 
-def _sizes(v: ExperimentFindings) -> list[str]:
+def _sizes(found: ExperimentFindings) -> list[str]:
     """How large each effect is here, and which are those of other tests."""
-    here = [_amplitude(effect, amplitude) for effect, amplitude in v.get("amplitudes", {}).items()]
-    elsewhere = [f"{sentence}." for sentence in in_other_tests(v)]
+    here = [_amplitude(effect, amplitude) for effect, amplitude in found.get("amplitudes", {}).items()]
+    elsewhere = [f"{sentence}." for sentence in in_other_tests(found)]
     return here + elsewhere
 
 

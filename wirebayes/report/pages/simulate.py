@@ -58,27 +58,27 @@ def simulate_page(folder: Path, configuration: Configuration) -> Page:
     return Page("Simulated tests", lead, sections, footer)
 
 
-def _section(e: Experiment, truth: TrueWire) -> Section:
+def _section(experiment: Experiment, truth: TrueWire) -> Section:
     effects = truth.get("effects", [])
     beyond = ", ".join(spoken(name) for name in effects) or "nothing: the plain model made these readings"
-    source = drawn(figures.measured(e.protocol(), e.readings(), e.name))
-    alt = f"Readings of {e.name} against what was set."
+    source = drawn(figures.measured(experiment.protocol(), experiment.readings(), experiment.name))
+    alt = f"Readings of {experiment.name} against what was set."
     caption = "Within each hold the readings go from the blue point to the red ones."
     picture = Picture(source, alt, caption)
     blocks: list[Block] = [
         Pictures([picture]),
-        Text(f"{e.material}, {e.length_mm:g} mm. Beyond the plain model: {beyond}."),
-        _true_values(e, truth),
+        Text(f"{experiment.material}, {experiment.length_mm:g} mm. Beyond the plain model: {beyond}."),
+        _true_values(experiment, truth),
     ]
-    return Section(e.name, blocks)
+    return Section(experiment.name, blocks)
 
 
-def _true_values(e: Experiment, truth: TrueWire) -> Table:
+def _true_values(experiment: Experiment, truth: TrueWire) -> Table:
     effects = truth.get("effects", [])
     known = tuple(effect_named(effect) for effect in effects if effect.split("@")[0] in CATALOGUE)
     lines = []
     for name, value in truth["parameters"].items():
-        unit = unit_or_dash(unit_of(name, known, (e.control,)))
+        unit = unit_or_dash(unit_of(name, known, (experiment.control,)))
         what = SYMBOLS.get(name, "size of an effect")
         lines.append([name, number(value), unit, what])
     header = ["parameter", "true value", "unit", "what it is"]

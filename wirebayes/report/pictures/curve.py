@@ -101,7 +101,7 @@ def _warming_at(time_s: Floats, protocol: Protocol, warming_K: Floats) -> Floats
     return warming
 
 
-def through_the_readings(stored: Stored, title: str = "") -> Figure:
+def through_the_readings(stored: Stored, title: str) -> Figure:
     """The readings with the curve through them above, what the curve leaves over below.
 
     Parameters
@@ -127,12 +127,12 @@ def through_the_readings(stored: Stored, title: str = "") -> Figure:
     return figure
 
 
-def on_axes(stored: Stored, axes: Any = None) -> Any:
+def on_axes(stored: Stored, axes: Any) -> Any:
     """The readings with the curve through them, on axes of the user's.
 
     Parameters
     ----------
-    axes : matplotlib.axes.Axes, optional
+    axes : matplotlib.axes.Axes or None
         New ones when left out.
 
     Returns
@@ -154,13 +154,13 @@ def on_axes(stored: Stored, axes: Any = None) -> Any:
     return axes
 
 
-def both_on_axes(plain: Stored, final: Stored, axes: Any = None) -> Any:
+def both_on_axes(plain: Stored, final: Stored, axes: Any) -> Any:
     """The readings with the curves of two models through them, on axes of the user's.
 
     Parameters
     ----------
     plain, final : Stored
-    axes : matplotlib.axes.Axes, optional
+    axes : matplotlib.axes.Axes or None
         New ones when left out.
 
     Returns

@@ -262,17 +262,17 @@ def _residuals(axis: Axes, stored: Stored, held: list[int]) -> None:
         of_hold = [values[hold][keep] for values in bands]
         if numbers[place] in held:
             axis.axvspan(place, place + 1, color=_HELD, zorder=0, label=labels.pop("held", None))
-        _draw_hold(axis, place + 0.1 + _scaled_time(protocol, hold, 0.8), of_hold, labels)
+        _draw_hold(axis, place + 0.1 + _scaled_time(protocol, hold), of_hold, labels)
     axis.axhline(0.0, color="0.5", lw=0.6)
     middles = np.arange(len(shown)) + 0.5
     axis.set_xticks(middles, list(map(str, numbers)))
     axis.set_xlim(0, len(shown))
 
 
-def _scaled_time(protocol: Protocol, hold: int, length: float) -> Floats:
-    """Times of a hold's readings, the hold as long as this."""
+def _scaled_time(protocol: Protocol, hold: int) -> Floats:
+    """Times of a hold's readings, drawn over `_HOLD_WIDTH`."""
     time = protocol.time_s[hold][protocol.mask[hold]]
-    return length * time / max(float(protocol.duration_s[hold]), 1e-9)
+    return _HOLD_WIDTH * time / max(float(protocol.duration_s[hold]), 1e-9)
 
 
 def _draw_hold(axis: Axes, x: Floats, of_hold: list[Floats], labels: dict[str, str]) -> None:
@@ -293,6 +293,7 @@ def _left_with_band(stored: Stored) -> tuple[Floats, Floats, Floats]:
     return stored.sample.readings[..., 0] - middle, low - middle, high - middle
 
 
+_HOLD_WIDTH = 0.8  # of the place of a hold: a tenth stays empty on either side
 _SHOWN = 0.05  # p of a pattern that is worth a picture
 _GROUPS = 12  # points of the line of means: each is the mean of some five readings of a test like the paper's
 _PANEL = (5.4, 3.4)  # inches: letters can be read where a phone shows it

@@ -29,13 +29,13 @@ _JOINTS: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {  # axes of the c
 _FIXED_AXES = "S_FIXED_XYZ"  # its angles turn about axes of the base
 
 
-def robot_of_caspr(bodies: Element, cables: Element, cable_set: str | None = None) -> ImportedRobot:
+def robot_of_caspr(bodies: Element, cables: Element, cable_set: str | None) -> ImportedRobot:
     """A robot of one rigid platform from the root elements of both files.
 
     Parameters
     ----------
     bodies, cables : Element
-    cable_set : str, optional
+    cable_set : str or None
         Which set of cables; default: the file's own.
 
     Raises

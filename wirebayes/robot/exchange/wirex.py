@@ -16,7 +16,7 @@ from wirebayes.strict.xml_file import Element
 _PATTERNS: dict[str, Freedom] = {"3R3T": "pose", "3T": "position"}
 
 
-def robot_of_wirex(models: Element, pulleys: bool = True) -> ImportedRobot:
+def robot_of_wirex(models: Element, pulleys: bool) -> ImportedRobot:
     """A robot from the root element of a file.
 
     Parameters

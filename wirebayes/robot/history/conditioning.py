@@ -53,13 +53,13 @@ class LogReadings:
         """What unknowns with the sensors' offsets, ``(n, d + m)``, leave of the readings, ``(n, t, m)``."""
         first = white.shape[1] - len(self.of.offset)
         offset = white[:, None, first:] * self.of.offset
-        return np.asarray(self.values - predicted_readings(track) - offset)
+        return self.values - predicted_readings(track) - offset
 
     def cost(self, residual: Floats, white: Floats) -> Floats:
         """Twice the negative log of the posterior density, ``(n,)``; infinite where a platform fell that was read."""
         scaled = self.counts[:, None] * (residual / self.of.noise) ** 2
         squares = np.nansum(scaled, (1, 2)) + (white**2).sum(1)
-        return np.asarray(np.where(self.missed(residual), np.inf, squares))
+        return np.where(self.missed(residual), np.inf, squares)
 
     def missed(self, residual: Floats) -> Bools:
         """(n,) Which platforms had fallen when they were read."""
@@ -198,7 +198,7 @@ def _shares(logs: Floats) -> tuple[Floats, float]:
         return np.zeros(len(logs)), 0.0
     weight = np.exp(logs - logs.max())
     share = weight / weight.sum()
-    return np.asarray(share), float(1.0 / (share**2).sum())
+    return share, float(1.0 / (share**2).sum())
 
 
 @dataclass(frozen=True)
@@ -243,19 +243,19 @@ def _linear_draws(prior: Floats, mode: Mode, noise: Floats) -> Floats:
     """Draws of the posterior, were readings straight about the mode."""
     of_each = np.tile(mode.found.vector, (len(prior), 1))
     about = replace(mode.found, vector=of_each)
-    return np.asarray(mode.white + about.moves(prior - mode.white, noise))
+    return mode.white + about.moves(prior - mode.white, noise)
 
 
 def _log_weight(read: LogReadings, draws: Floats, residual: Floats, found: Information) -> Floats:
     """(n,) of what linear moves cannot explain."""
     explained = _length(found.moves(-draws, None), found) ** 2
-    return np.asarray(-0.5 * (read.cost(residual, draws) - explained))
+    return -0.5 * (read.cost(residual, draws) - explained)
 
 
 def _length(move: Floats, found: Information) -> Floats:
     """Length of moves ``(n, d + m)`` in posterior standard deviations, whatever their direction."""
     precision = found.matrix + np.eye(move.shape[1])
-    return np.asarray(np.sqrt(np.einsum("ni,ij,nj->n", move, precision, move)))
+    return np.sqrt(np.einsum("ni,ij,nj->n", move, precision, move))
 
 
 def _joined(tracks: list[Track]) -> Track:

@@ -174,7 +174,7 @@ def clock_starts(history: History, tension_N: Floats, share: float = RESTART) ->
     if history.hold is not None and np.isfinite(share):
         new = np.diff(history.hold) != 0
         begins = np.concatenate([[True], new])
-        return np.asarray(times[begins])
+        return times[begins]
     starts = [float(times[0])]
     reference = tension_N[0]
     for k in range(1, len(times)):

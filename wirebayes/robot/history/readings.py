@@ -37,17 +37,17 @@ class Sensors:
     @property
     def sd(self) -> Floats:
         """(m,) standard deviations of all that a reading is off by."""
-        return np.asarray(np.hypot(self.error, self.bias))
+        return np.hypot(self.error, self.bias)
 
     @property
     def noise(self) -> Floats:
         """(m,) standard deviations of what differs from reading to reading."""
-        return np.asarray(self.error * np.sqrt(1.0 - _OFFSET))
+        return self.error * np.sqrt(1.0 - _OFFSET)
 
     @property
     def offset(self) -> Floats:
         """(m,) standard deviations of what stays."""
-        return np.asarray(np.hypot(self.error * np.sqrt(_OFFSET), self.bias))
+        return np.hypot(self.error * np.sqrt(_OFFSET), self.bias)
 
 
 def sensors(robot: Robot, errors: Uncertain) -> Sensors:
@@ -137,9 +137,9 @@ class Information:
         if noise is not None:
             values, vectors = np.linalg.eigh(self.matrix)
             right = right + noise @ (vectors * np.sqrt(np.maximum(values, 0.0))).T
-        return np.asarray(cho_solve(cho_factor(self.matrix + np.eye(len(self.matrix))), right.T).T)
+        return cho_solve(cho_factor(self.matrix + np.eye(len(self.matrix))), right.T).T
 
     @property
     def sd(self) -> Floats:
         """(e,) posterior standard deviations in units of the prior's."""
-        return np.asarray(np.sqrt(np.diag(np.linalg.inv(self.matrix + np.eye(len(self.matrix))))))
+        return np.sqrt(np.diag(np.linalg.inv(self.matrix + np.eye(len(self.matrix)))))

@@ -90,12 +90,12 @@ class LogUnknowns:
 
     def differences(self, about: Floats) -> Floats:
         """White unknowns ``(1 + d, d)`` whose predictions give the derivatives at a point ``(d,)``; see `slopes`."""
-        return np.asarray(np.concatenate([about[None], about + _STEP * np.eye(self.count)]))
+        return np.concatenate([about[None], about + _STEP * np.eye(self.count)])
 
 
 def slopes(values: Floats) -> Floats:
     """Derivatives ``(d, ...)`` by the white unknowns of values ``(1 + d, ...)`` at `LogUnknowns.differences`."""
-    return np.asarray((values[1:] - values[0]) / _STEP)
+    return (values[1:] - values[0]) / _STEP
 
 
 def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: Generator) -> LogUnknowns:
@@ -118,7 +118,7 @@ def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: Generator) -
     root = np.asarray(np.linalg.cholesky(covariance), np.float64)
     off = _drawn(prior, robot.legs, rng) - mean
     white = solve_triangular(root, off.T, lower=True).T
-    return LogUnknowns(robot, prior, mean, root, np.asarray(white))
+    return LogUnknowns(robot, prior, mean, root, white)
 
 
 def _drawn(prior: LengthPrior, legs: int, rng: Generator) -> Floats:

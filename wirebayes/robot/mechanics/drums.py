@@ -30,7 +30,7 @@ class _Winding:
     def angle(self, wound: Floats) -> Floats:
         """Drum angles, rad, at which so much wire is on the drum, m."""
         layer = _layer_of(self.wire_m, wound)
-        return np.asarray(self.angle_rad[layer] + (wound - self.wire_m[layer]) / self.per_rad_m[layer])
+        return self.angle_rad[layer] + (wound - self.wire_m[layer]) / self.per_rad_m[layer]
 
 
 def _winding(drums: Drums, leg: int) -> _Winding:

@@ -114,7 +114,7 @@ def _held_square(robot: Robot, stiffness: Floats, normal_N: float) -> Floats:
     most_N = plane.friction * abs(normal_N)
     # columns: the displacement of each unit force and of each unit moment that the ring can bear
     answer = most_N * np.linalg.inv(stiffness) @ (P * _ring(robot))
-    return np.asarray(answer @ answer.mT)
+    return answer @ answer.mT
 
 
 def _ring(robot: Robot) -> Floats:

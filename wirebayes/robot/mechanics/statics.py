@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wirebayes.numeric.batches import batch_last
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.pulleys import WireRun, wire_run
@@ -120,6 +121,25 @@ def weight(robot: Robot, rotation: Floats) -> Floats:
         arm = turned(robot.centre_of_mass_m[None], rotation)[:, 0]
         out[3], out[4] = -arm[1] * force, arm[0] * force
     return out if robot.motions is None else robot.motions @ out
+
+
+def stretched_at(robot: Robot, position_m: Floats, rotation: Floats, offset_m: Floats) -> Floats:
+    """`stretched` at poses, with the batch first.
+
+    Parameters
+    ----------
+    robot : Robot
+    position_m, rotation : (n, 3), (n, 3, 3) arrays
+    offset_m : (n, w) array
+        Length beyond the exit point.
+
+    Returns
+    -------
+    (n, w) array
+        m.
+    """
+    shape = geometry(robot, position_m.T, batch_last(rotation))
+    return stretched(robot, shape, offset_m.T).T
 
 
 def stretched(robot: Robot, shape: Geometry, offset_m: Floats) -> Floats:

@@ -48,7 +48,7 @@ def _nearest(reference: Floats, structure: Floats, load: Floats, lowest: float, 
         return None
     null = right[rank:].T
     wished = null.T @ (reference - particular)
-    tau = np.asarray(particular + null @ wished)
+    tau = particular + null @ wished
     too_low = lowest - tau.min()
     too_high = tau.max() - highest
     outside = float(max(too_low, too_high))

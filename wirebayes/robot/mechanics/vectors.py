@@ -6,7 +6,7 @@ from wirebayes.numeric.typing import Floats
 
 
 def dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Floats, b: Floats) -> Floats:
@@ -14,4 +14,4 @@ def cross(a: Floats, b: Floats) -> Floats:
 
 
 def norm(a: Floats) -> Floats:
-    return np.asarray(np.sqrt(dot(a, a)))
+    return np.sqrt(dot(a, a))

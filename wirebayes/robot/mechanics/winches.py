@@ -49,7 +49,7 @@ def mean_of_each_winch(robot: Robot, value: Floats) -> Floats:
     if robot.winch is None:
         return value
     share = turned_by(robot)
-    return np.asarray(value @ (share / share.sum(0)))
+    return value @ (share / share.sum(0))
 
 
 def first_legs(robot: Robot) -> Indices:

@@ -195,7 +195,7 @@ def zero_tension_length(wires: Wires, stretched_m: Floats, tension_N: Floats) ->
 
         def bends(strain: Floats) -> Floats:
             hold.zero_mm = 1e3 * wires.elastic.zero_length(stretched_m, strain)
-            return np.asarray(wires.placed.change("strain", strain, hold))
+            return wires.placed.change("strain", strain, hold)
 
         strain = inverse(bends, effective)
     with np.errstate(invalid="ignore"):

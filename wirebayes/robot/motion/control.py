@@ -202,7 +202,7 @@ class Limits:
         """
         shift, angle = drift.shift_and_turn(walk.here.position_m, walk.here.rotation, self.position_m, self.rotation)
         near = np.linalg.norm(shift, axis=-1) < self.distance_m
-        return np.asarray(walk.live & near & (angle < self.angle_rad))
+        return walk.live & near & (angle < self.angle_rad)
 
 
 @dataclass(frozen=True)

@@ -122,7 +122,7 @@ class HoldCreep:
         """What creep's own clock counts from now to a later time: growth of ``k2 t^N``, or of the share reached."""
         self._look(time_s)
         if self._open_ended:
-            return np.asarray(self.law.fraction(self.k2, self.hold) - self.reached)
+            return self.law.fraction(self.k2, self.hold) - self.reached
         return self._passed(self.law.clock(self.hold))
 
     def _passed(self, clock: Floats) -> Floats:

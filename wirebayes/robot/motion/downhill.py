@@ -84,7 +84,7 @@ def lead_downhill(
     x: Floats,
     R: Floats,
     max_iterations: int,
-    leash_m: Floats | float = np.inf,
+    leash_m: Floats | float,
 ) -> Solved:
     """Lead all cases downhill: by a few iterations, and the slow ones of all chunks together.
 

@@ -24,13 +24,13 @@ def turned_away(robot: Robot, rotation: Floats) -> list[Notice]:
     if robot.is_underactuated and not robot.home_rotation_is_stated:
         return []
     stated = robot.home_rotation_rad if robot.rotation_of_file_rad is None else robot.rotation_of_file_rad
-    away = float(np.degrees(np.linalg.norm(turning.vector((rotation @ turning.matrix(stated).T)[None])[0])))
+    away = float(np.degrees(np.linalg.norm(turning.vector(rotation @ turning.matrix(stated).T))))
     if away < TURNED_AWAY:
         return []
     why, accepted = "no tensions within the bounds hold", ""
     if robot.is_underactuated:
         why = f"balance, to which {robot.legs} wires leave the orientation, does not give"
-        accepted = f"write [{coordinates(turning.vector(rotation[None])[0], 4)}] there if that is meant, else "
+        accepted = f"write [{coordinates(turning.vector(rotation), 4)}] there if that is meant, else "
     text = (
         f"{why} the rotation that the robot's file asks for (pose.rotation_vector_rad): the platform hangs {away:.3g} "
         f"degrees away from it; {accepted}check that rotation (rad), the centre of mass and the points (m)"

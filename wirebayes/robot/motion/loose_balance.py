@@ -56,7 +56,7 @@ def slope_by_place(robot: Robot, x: Floats, R: Floats, tau: Floats) -> Floats:
     turn = batch_last(R)
     shape = statics.geometry(robot, x.T, turn)
     stiffness = stiffness_at_tension(robot, shape, turn, tau.T)
-    return np.asarray(stiffness[:, :, :3] * robot.edge_scale[:, None])
+    return stiffness[:, :, :3] * robot.edge_scale[:, None]
 
 
 def largest_imbalance(robot: Robot, x: Floats, R: Floats, tau: Floats) -> tuple[Floats, Floats]:
@@ -77,7 +77,7 @@ def null_space(matrix: Floats) -> Floats:
     """Orthonormal columns that a matrix maps to zero."""
     _, sizes, right = np.linalg.svd(matrix)
     if not sizes.size:
-        return np.asarray(right.T)
+        return right.T
     least = DEPENDENT * max(float(sizes[0]), 1e-300)
     rank = int((sizes > least).sum())
     return right[rank:].T

@@ -53,7 +53,7 @@ def held(robot: Robot, wires: Wires, pose: Poses, lengths: Lengths) -> Bools:
         As for `lowest_stiffness`.
     """
     touching, least, largest = _bounds(robot, wires, pose, lengths)
-    return np.asarray(touching & (least > _APART * largest))
+    return touching & (least > _APART * largest)
 
 
 def _bounds(robot: Robot, wires: Wires, pose: Poses, lengths: Lengths) -> tuple[Bools, Floats, Floats]:
@@ -158,4 +158,4 @@ def _directions(both: Floats, one_way: Floats) -> Floats:
 def _of_every_set(one_way: Floats) -> Floats:
     """(2^m, d, d) forms that the numbers of every set of the m add."""
     sets = np.array(list(product((0.0, 1.0), repeat=one_way.shape[1])))
-    return np.asarray(np.einsum("im,sm,jm->sij", one_way, sets, one_way))
+    return np.einsum("im,sm,jm->sij", one_way, sets, one_way)

@@ -224,7 +224,7 @@ def _step(
     _let_go(robot, wires, there, lengths)
     near_prediction = _apart_m(robot, there.poses, predicted) <= trusted
     held = there.found & believed & near_prediction
-    return there, np.asarray(held)
+    return there, held
 
 
 def _believed(robot: Robot, ahead: Floats) -> Bools:
@@ -249,7 +249,7 @@ def _within(slip: Slip, there: Poses, here: Poses) -> Bools:
     displaced = np.linalg.norm(there[0] - here[0], axis=1)
     turn = there[1] @ here[1].mT - np.eye(3)
     angle = np.linalg.norm(turn, axis=(1, 2)) / np.sqrt(2.0)
-    return np.asarray((displaced <= slip[0]) & (angle <= slip[1]))
+    return (displaced <= slip[0]) & (angle <= slip[1])
 
 
 def _let_go(robot: Robot, wires: Wires, there: forward.Equilibria, lengths: Lengths) -> None:
@@ -292,7 +292,7 @@ def _softest(robot: Robot, wires: Wires, balance: Poses, lengths: Lengths) -> Fl
     """(n, d) motions against which the stiffness is least."""
     _, hessian = balance_at(robot, wires, *balance, *lengths)
     _, directions = np.linalg.eigh(batch_first(hessian))
-    return np.asarray(directions[..., 0])
+    return directions[..., 0]
 
 
 def settle(robot: Robot, wires: Wires, near: Poses, lengths: Lengths, small: float = _SMALL) -> forward.Equilibria:

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from wirebayes.errors import shown
-from wirebayes.numeric.batches import batch_last
 from wirebayes.numeric.rows import chosen_rows
 from wirebayes.numeric.typing import Bools, Floats, Indices
 from wirebayes.result_warnings import Notice
@@ -371,7 +370,6 @@ def _stretch(robot: Robot, joint_m: Floats, start_m: Floats) -> Floats:
     stiff = {"k1": np.full((1, 1), _RIGID * robot.mass_kg * GRAVITY)}
     rigid = Wires("hooke", "saturating", stiff, np.full((robot.legs, 1), 1000.0))
     there = forward.solve_equilibrium(robot, rigid, zero, offset, start_m, matrix(robot.home_rotation_rad))
-    shape = statics.geometry(robot, there.position_m.T, batch_last(there.rotation))
-    beyond = np.broadcast_to(offset, zero.shape).T
-    stretch = statics.stretched(robot, shape, beyond).T / zero
+    beyond = np.broadcast_to(offset, zero.shape)
+    stretch = statics.stretched_at(robot, there.position_m, there.rotation, beyond) / zero
     return chosen_rows(there.found, stretch, np.inf)

@@ -183,7 +183,7 @@ def _by_joint(robot: Robot, slope: Floats, ratio: Floats, grown: Floats) -> Floa
     A tension depends on the strain alone: by the zero-tension length it falls as it grows by the stretched one.
     """
     by_line = slope * np.where(robot.is_linear, robot.ratio, -ratio * grown)
-    return np.asarray(by_line[:, :, None] * turned_by(robot))
+    return by_line[:, :, None] * turned_by(robot)
 
 
 def _slopes(

@@ -109,7 +109,7 @@ def _by_winches(held: "_Held", content: PoseJson) -> "_Held":
     tau = commands.tension_N[commands.feasible].mean(0, keepdims=True)
     x, asked = request.position_m[None], request.rotation[None]
     R = inverse.commands(robot, control.known(held.wires), x, asked, tau).rotation[0]
-    content["pose"]["rotation_vector_rad"] = turning.vector(R[None])[0]
+    content["pose"]["rotation_vector_rad"] = turning.vector(R)
     if robot.joints < robot.freedoms:
         content["orientation"] = by_lines(robot, R)
     return replace(held, request=replace(request, rotation=R), tension_N=tau)
@@ -250,7 +250,7 @@ def _requested(robot: Robot, line: WireDraws, x: Floats, R: Floats, turned: Orie
         "version": 1,
         "robot": robot.name,
         "mass_kg": robot.mass_kg,
-        "pose": {"position_m": x, "rotation_vector_rad": turning.vector(R[None])[0]},
+        "pose": {"position_m": x, "rotation_vector_rad": turning.vector(R)},
         "wires": wires_summary(robot, line),
         "tension_distribution": {
             "choice": robot.rule.choice,

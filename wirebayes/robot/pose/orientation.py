@@ -202,7 +202,7 @@ def _described(robot: Robot, x: Floats, found: hanging.Hanging, asked: Floats, h
         "other_rotation_vectors_rad": others,
         "sentence": _summary(robot, degrees, len(places), left, free, len(others)),
     }
-    turned_rad = turning.vector(R[None])[0]
+    turned_rad = turning.vector(R)
     missed = _missed(asked, turned_rad, refused)
     return Orientation(x, R, content, "", missed)
 
@@ -223,7 +223,7 @@ def _movable(robot: Robot, rotation: Floats) -> Bools:
     if robot.plane is None:
         return np.ones(3, bool)
     change = vector_by_turn(turning.vector(rotation[None]))[0] @ robot.plane.normal
-    return np.asarray(np.abs(change) > _FIXED)
+    return np.abs(change) > _FIXED
 
 
 def _names(components: Bools) -> list[str]:

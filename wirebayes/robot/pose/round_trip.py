@@ -96,7 +96,7 @@ def _is_at(robot: Robot, found: forward.Equilibria, x: Floats, R: Floats) -> Boo
 def _equilibrium(x: Floats, R: Floats, tension_N: Floats, commanded: bool, *, stable: bool) -> EquilibriumPose:
     return {
         "position_m": x,
-        "rotation_vector_rad": turning.vector(R[None])[0],
+        "rotation_vector_rad": turning.vector(R),
         "slack_wires": int((tension_N <= 0).sum()),
         "commanded": bool(commanded),
         "stable": stable,

@@ -187,23 +187,25 @@ def _prior(prior: LengthPrior, errors: StatedErrors, session: Session) -> Calibr
     return known
 
 
-def _poses(s: Summary, session: Session) -> EstimatedPoses:
-    mean, sd, half = (np.hstack([place, turn]) for place, turn in zip(s.position_m, s.turn_rad, strict=True))
-    return {"hold": np.asarray(session.numbers, float).tolist(), **interval_about(mean, sd, half)}
+def _poses(summary: Summary, session: Session) -> EstimatedPoses:
+    pairs = zip(summary.position_m, summary.turn_rad, strict=True)
+    mean, sd, half = (np.hstack([position, turn]) for position, turn in pairs)
+    numbers = np.asarray(session.numbers, float)
+    return {"hold": numbers.tolist(), **interval_about(mean, sd, half)}
 
 
-def _lengths(found: RobotPosterior, s: Summary, p_joint: float) -> EstimatedLengths:
-    reference = s.reference_m
+def _lengths(found: RobotPosterior, summary: Summary, p_joint: float) -> EstimatedLengths:
+    reference = summary.reference_m
     known: EstimatedLengths = {
         "converged": found.converged,
         "misfit": misfit(found),
         "p_joint": p_joint,
-        "length_m": interval_about(*s.length_m),
-        "creep_strain": s.strain,
+        "length_m": interval_about(*summary.length_m),
+        "creep_strain": summary.strain,
         "reference_error_mm": {"mean": 1e3 * reference.mean, "sd": 1e3 * reference.sd},
     }
     if found.unknowns.prior.bias_sd_N > 0:
-        known["tension_bias_N"] = {"mean": s.bias_N.mean, "sd": s.bias_N.sd}
+        known["tension_bias_N"] = {"mean": summary.bias_N.mean, "sd": summary.bias_N.sd}
     return known
 
 
@@ -245,11 +247,11 @@ def _identified(seen: Identified) -> IdentifiedJson:
     }
 
 
-def _now(robot: Robot, found: RobotPosterior, s: Summary, usable: bool) -> CalibratedPoses:
+def _now(robot: Robot, found: RobotPosterior, summary: Summary, usable: bool) -> CalibratedPoses:
     """Where the platform is after the last hold; joint values of the home pose where they can be used."""
     if not found.converged:
         return {"pose_now": None, "joint_values_for_home_m": None}
-    pose: PoseNow = {"position_m": s.position_m.mean[-1], "rotation_vector_rad": s.turn_rad.mean[-1]}
+    pose: PoseNow = {"position_m": summary.position_m.mean[-1], "rotation_vector_rad": summary.turn_rad.mean[-1]}
     now: CalibratedPoses = {"pose_now": pose, "joint_values_for_home_m": None}
     if not usable:  # nobody should send the robot there
         return now

@@ -25,7 +25,19 @@ _STEPS = 12  # of a descent: noise and creep change before more are worth it
 
 @dataclass(frozen=True)
 class NormalEquations:
-    """Normal equations with the holds eliminated."""
+    """Normal equations with the holds eliminated.
+
+    Attributes
+    ----------
+    by_robot : (p, h, m) array
+        How the unknowns of each hold follow those of the robot.
+    alone : (p, h) array
+        Step of each hold's unknowns while those of the robot stay.
+    inverse : (p, h, h) array
+        Of each hold's own equations.
+    matrix, slope : (m, m), (m,) arrays
+        For the robot's unknowns.
+    """
 
     by_robot: Floats
     alone: Floats
@@ -45,19 +57,20 @@ def eliminated(e: Equations, white: Floats, damping: float) -> NormalEquations:
     damping : float
         Levenberg-Marquardt's; 0 at the mode.
     """
-    by_hold, by_robot = e.by_hold, e.by_robot
+    by_hold = e.by_hold
+    by_robot = e.by_robot
     residual = e.residual[..., None]
     inverse = inv(own_normal(by_hold, damping + LEAST_DAMPING))
     mixed = by_hold.mT @ by_robot
     follows = -inverse @ mixed
     alone = -inverse @ (by_hold.mT @ residual)
-    of_each_hold = by_robot.mT @ by_robot + mixed.mT @ follows
+    matrix_of_each = by_robot.mT @ by_robot + mixed.mT @ follows
     slope_of_each = by_robot.mT @ residual + mixed.mT @ alone
-    slope = slope_of_each.sum(0)[:, 0]
-    squares = np.einsum("pki,pki->i", by_robot, by_robot)
     prior = (1.0 + damping) * np.eye(len(white))
-    matrix = of_each_hold.sum(0) + prior + damping * np.diag(squares)
-    return NormalEquations(follows, alone[..., 0], inverse, matrix, slope + white)
+    squares = np.einsum("pki,pki->i", by_robot, by_robot)
+    matrix = matrix_of_each.sum(0) + prior + damping * np.diag(squares)
+    slope = slope_of_each.sum(0)[:, 0] + white
+    return NormalEquations(follows, alone[..., 0], inverse, matrix, slope)
 
 
 @dataclass(frozen=True)

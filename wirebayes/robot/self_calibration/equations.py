@@ -75,7 +75,16 @@ class Noise:
 
 @dataclass(frozen=True)
 class State:
-    """A robot's unknowns in units of their prior, with the pose and the latent tensions at every hold's end."""
+    """A robot's unknowns, and what is unknown of each of its p holds at its end.
+
+    Attributes
+    ----------
+    white : (m,) array
+        The robot's unknowns in units of their prior.
+    position_m, rotation : (p, 3), (p, 3, 3) arrays
+    pull_N : (p, w) array
+        Latent tensions; negative where a wire is slack.
+    """
 
     white: Floats
     position_m: Floats

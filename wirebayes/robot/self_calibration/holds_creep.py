@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from wirebayes.numeric.batches import batch_last
 from wirebayes.numeric.rows import chosen_rows
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import statics
@@ -81,12 +80,10 @@ class _Here:
         parts = unknowns.parts(state.white)
         self.state = state
         self.robot = moved(unknowns.robot, parts)
-        self.wires = unknowns.prior.wires(unknowns.robot, parts.wires[None])[0]
-        self.offset = inverse.lengths(self.robot, holds.session.joint_m)[1]
-        turn = batch_last(state.rotation)
-        shape = statics.geometry(self.robot, state.position_m.T, turn)
-        way = statics.stretched(self.robot, shape, self.offset.T).T
-        self.zero = way / stretch(unknowns, state.white, state.pull_N).ratio
+        self.wires, _ = unknowns.prior.wires(unknowns.robot, parts.wires[None])
+        _, self.offset = inverse.lengths(self.robot, holds.session.joint_m)
+        stretched = statics.stretched_at(self.robot, state.position_m, state.rotation, self.offset)
+        self.zero = stretched / stretch(unknowns, state.white, state.pull_N).ratio
         self.response = self._response()
 
     def _response(self) -> Floats:

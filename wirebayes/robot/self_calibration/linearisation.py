@@ -216,7 +216,7 @@ def _errors_apart(robot: Robot) -> Floats | None:
         return None
     share = turned_by(robot)
     covariance = 0.5 * (np.eye(robot.legs) + share @ share.T)
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
+    return np.linalg.inv(np.linalg.cholesky(covariance))
 
 
 def _balance(out: Equations, about: _About) -> None:

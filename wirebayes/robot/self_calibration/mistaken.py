@@ -95,18 +95,17 @@ def _refuse_lengths(robot: Robot, session: Session, rows: Bools, table: CsvTable
 
 def _apart(robot: Robot, session: Session, rows: Bools, order: Sequence[int]) -> Floats:
     """(w,) How far joint values in an order are from the lengths to stated poses, but for a constant of each wire."""
-    turn = batch_last(session.rotation[rows])
-    shape = statics.geometry(robot, session.position_m[rows].T, turn)
     bare, offset = lengths(robot, session.joint_m[rows][:, order])
-    way = statics.stretched(robot, shape, offset.T).T
-    return (way - bare).std(0)  # references may err
+    stretched = statics.stretched_at(robot, session.position_m[rows], session.rotation[rows], offset)
+    return (stretched - bare).std(0)  # references may err
 
 
 def _refuse_tensions(robot: Robot, session: Session, tension_N: Floats, rows: Bools, table: CsvTable) -> None:
     """Tensions in another unit, and two columns that are the tensions of each other's wires."""
     mistake = _tension_mistake(robot, session.position_m[rows], session.rotation[rows], tension_N[rows])
     if mistake is not None:
-        raise InputError(f"{table.path}, {mistake[0]}: found {mistake[1]}, expected {mistake[2]}")
+        columns, found, expected = mistake
+        raise InputError(f"{table.path}, {columns}: found {found}, expected {expected}")
 
 
 def column_notices(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> list[Notice]:

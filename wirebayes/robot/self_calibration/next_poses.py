@@ -18,7 +18,7 @@ from wirebayes.robot.self_calibration.equations import Equations, Holds, State, 
 from wirebayes.robot.self_calibration.linearisation import linearised
 from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.session import Session
-from wirebayes.robot.self_calibration.strain import Grown
+from wirebayes.robot.self_calibration.strain import no_creep
 
 _CANDIDATES = 150  # in the workspace: closer together they say the same
 
@@ -59,9 +59,8 @@ def next_poses(found: RobotPosterior, holds: Holds, count: int, rng: np.random.G
     as_read = _as_read(holds, poses)
     told = _commanded(found, robot, as_read, poses)
     unread = _at(found, _blind(told), poses)
-    motion = _follows(unread, robot.degrees)
-    position = motion[:, :3]  # what counts
-    root = np.moveaxis(position, 0, 1).reshape(-1, motion.shape[2])
+    position = _follows(unread, robot.degrees)[:, :3]  # what counts
+    root = np.moveaxis(position, 0, 1).reshape(-1, unknowns.count)
     information = _information(_at(found, told, poses))
     most = min(count, len(poses.x))
     picked, sd = _one_after_another(found.covariance, information, root, most)
@@ -102,8 +101,10 @@ def _blind(holds: Holds) -> Holds:
 
 def _one_after_another(covariance: Floats, information: Floats, root: Floats, count: int) -> tuple[list[int], Floats]:
     """Candidates that leave the smallest pose error, each beside those before it, and that error before and after."""
-    known, poses = inv(covariance), len(information)
-    sd, picked = [_rms(covariance, root, poses)], []
+    known = inv(covariance)
+    poses = len(information)
+    sd = [_rms(covariance, root, poses)]
+    picked = []
     for _ in range(count):
         left = [_rms(inv(known + one), root, poses) for one in information]
         choice = int(np.nanargmin(left))
@@ -144,13 +145,8 @@ def _tilt_as_read(holds: Holds, poses: _Candidates) -> Floats | None:
 
 def _at(found: RobotPosterior, holds: Holds, poses: _Candidates) -> Equations:
     state = State(found.state.white, poses.x, np.array(poses.R), poses.tau)
-    no_creep = _no_creep(found, len(poses.x))
-    return linearised(found.unknowns, holds, found.noise, state, no_creep, state)
-
-
-def _no_creep(found: RobotPosterior, count: int) -> Grown:
-    legs, wires = found.unknowns.robot.legs, len(found.unknowns.moments[0])
-    return Grown(np.zeros((count, legs)), np.zeros((count, legs, wires)), np.zeros((count, count, legs)))
+    fresh = no_creep(found.unknowns, len(poses.x))
+    return linearised(found.unknowns, holds, found.noise, state, fresh, state)
 
 
 def _information(e: Equations) -> Floats:
@@ -158,11 +154,13 @@ def _information(e: Equations) -> Floats:
     by_hold, by_robot = e.by_hold, e.by_robot
     mixed = by_hold.mT @ by_robot
     follows = solve(by_hold.mT @ by_hold, mixed)
-    return np.asarray(by_robot.mT @ by_robot - mixed.mT @ follows, np.float64)
+    return by_robot.mT @ by_robot - mixed.mT @ follows
 
 
 def _follows(e: Equations, degrees: int) -> Floats:
     """(n, d, m) how a commanded pose follows the robot's unknowns: loops closed, platform in balance."""
-    part: Indices = np.r_[e.rows["loop"], e.rows["balance"]]
-    z, g = e.by_hold[:, part], e.by_robot[:, part]
-    return np.asarray(-solve(z, g)[:, :degrees], np.float64)
+    determining: Indices = np.r_[e.rows["loop"], e.rows["balance"]]
+    by_hold = e.by_hold[:, determining]
+    by_robot = e.by_robot[:, determining]
+    follows = -solve(by_hold, by_robot)
+    return follows[:, :degrees]

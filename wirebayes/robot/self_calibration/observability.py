@@ -33,20 +33,20 @@ def response(
     by_zero : (n, w) array
         Change of a wire's tension with its zero-tension length at the same stretched length, N/m.
     """
-    turn, zero = batch_last(rotation), zero_m.T
+    turn = batch_last(rotation)
+    zero = zero_m.T
     shape = statics.geometry(robot, position_m.T, turn)
     stretched = statics.stretched(robot, shape, offset_m.T)
     tau, slope = tension(wires, stretched, zero)
     _, hessian = statics.unbalance_and_stiffness(robot, shape, turn, tau, slope)
     J = batch_first(statics.wire_jacobian(robot, shape))
-    moves = -solve(batch_first(hessian), J)
-    motion = np.asarray(moves, np.float64)
+    motion = -solve(batch_first(hessian), J)
     lengthening = J.mT @ motion
     by_lengthening = slope.T[:, :, None] * lengthening
     change = by_lengthening + np.eye(robot.legs)
     # The tension depends on stretched / zero alone under either law, so its slope by zero follows from the other.
     by_zero = -slope * stretched / zero
-    return motion, np.asarray(change), by_zero.T
+    return motion, change, by_zero.T
 
 
 def length_sensitivity(

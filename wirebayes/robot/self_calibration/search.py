@@ -82,21 +82,31 @@ def searched(
     """
     about = None
     if poses is StatedPoses.REQUESTED:
-        about, holds = near_requests(unknowns, holds), _without_poses(holds)
+        about = near_requests(unknowns, holds)
+        holds = _without_poses(holds)
     found = best(unknowns, holds, rng, progress, about=about)
     too_good = bool(holds.placed.any()) and _too_good(found)
     doubted = poses is StatedPoses.EITHER
     found, holds, requested = _rather_requests(found, holds, too_good, doubted, progress)
-    p, at_fault = trust(found), None
-    if (p < SIGNIFICANT or found.noise.balance > _UNSEEN) and not lost(found):
-        at_fault = suspects(found, holds, progress_of(progress, "sensors"))
+    p = trust(found)
+    at_fault = _sensor_at_fault(found, holds, p, progress)
     inexact = unknowns.errors.joint_m == 0 and not (found.converged and p >= SIGNIFICANT)
     if inexact and misfit(found) < _GROSS:
         # how far from exact the joint values are tells more than that there is no answer
         rough = replace(unknowns, errors=replace(unknowns.errors, joint_m=None))
         other = best(rough, holds, rng, progress, "rough start", about)
-        found = other if other.converged or not found.converged else found
-    return Searched(found, holds, p, at_fault, inexact, requested, too_good and not requested)
+        if other.converged or not found.converged:
+            found = other
+    too_near = too_good and not requested
+    return Searched(found, holds, p, at_fault, inexact, requested, too_near)
+
+
+def _sensor_at_fault(found: RobotPosterior, holds: Holds, p: float, progress: Progress) -> Suspects | None:
+    """Which sensor would explain what contradicts; None where nothing does, or loops are too far open to tell."""
+    contradicts = p < SIGNIFICANT or found.noise.balance > _UNSEEN
+    if not contradicts or lost(found):
+        return None
+    return suspects(found, holds, progress_of(progress, "sensors"))
 
 
 def _rather_requests(
@@ -106,7 +116,9 @@ def _rather_requests(
 
     An answer is not given up for a search that found none.
     """
-    if not holds.placed.any() or not (too_good or (doubted and found.unknowns.errors.pose_m == 0)):
+    if not holds.placed.any():
+        return found, holds, False
+    if not too_good and not (doubted and found.unknowns.errors.pose_m == 0):
         return found, holds, False
     blind = _without_poses(holds)
     state = replace(found.state, white=np.zeros_like(found.state.white))
@@ -149,6 +161,9 @@ def _too_good(found: RobotPosterior) -> bool:
     """
     part = np.r_[0 : found.unknowns.slices["wires"].start, found.unknowns.references]
     values, vectors = np.linalg.eigh(found.covariance[np.ix_(part, part)])
-    seen = np.sqrt(np.maximum(values, 0.0)) < _WELL
-    deviations = vectors[:, seen].T @ found.state.white[part]
-    return bool(seen.any() and chdtr(int(seen.sum()), float(deviations @ deviations)) < _CHANCE)
+    determined = np.sqrt(np.maximum(values, 0.0)) < _WELL
+    deviations = vectors[:, determined].T @ found.state.white[part]
+    if not determined.any():
+        return False
+    so_near = chdtr(int(determined.sum()), float(deviations @ deviations))
+    return bool(so_near < _CHANCE)

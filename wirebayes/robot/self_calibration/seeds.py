@@ -77,13 +77,15 @@ def _fill_unread(robot: Robot, pull: Floats, unread: Bools, poses: Poses) -> Non
 def _carrying(robot: Robot, position_m: Floats, turn: Floats) -> Floats:
     """(w,) tensions above the lowest that carry the platform at a pose as nearly as they can, small ones rather."""
     shape = statics.geometry_at(robot, position_m, turn)
-    unit, lowest = robot.edge_scale, robot.rule.lowest_N
+    unit = robot.edge_scale
     structure = -statics.jacobian(robot, shape)[..., 0] * robot.lines * unit[:, None]
     load = -statics.weight(robot, turn[..., None])[:, 0] * unit
+    lowest = robot.rule.lowest_N
     left = load - structure.sum(1) * lowest
-    small = _SMALL * np.eye(robot.legs)
-    above, _ = nnls(np.vstack([structure, small]), np.concatenate([left, np.zeros(robot.legs)]))
-    return np.asarray(lowest + above)
+    rather_small = _SMALL * np.eye(robot.legs)
+    no_tension = np.zeros(robot.legs)
+    above, _ = nnls(np.vstack([structure, rather_small]), np.concatenate([left, no_tension]))
+    return lowest + above
 
 
 def _locate(unknowns: Unknowns, holds: Holds, white: Floats, ratio: Floats, poses: Poses, rng: Generator) -> None:
@@ -158,12 +160,14 @@ class _PoseSearch:
         robot = self.robot
         shape = statics.geometry(robot, x, R)
         J = batch_first(statics.wire_jacobian(robot, shape)).mT * robot.edge_scale
+        gap = self.gap(shape)
         toward, pull = self._toward_home(x, R)
         normal = J.mT @ J + _WEAK**2 * np.diag(pull**2)
-        slope = (J.mT @ self.gap(shape)[..., None])[..., 0] + _WEAK**2 * pull * toward
+        slope = (J.mT @ gap[..., None])[..., 0] + _WEAK**2 * pull * toward
         step = -solve(normal, slope[..., None])[..., 0]
         size = np.linalg.norm(step, axis=1, keepdims=True)
-        share = np.minimum(1.0, 0.2 * robot.span_m / np.maximum(size, 1e-300))
+        longest = 0.2 * robot.span_m
+        share = np.minimum(1.0, longest / np.maximum(size, 1e-300))
         return step * share * robot.edge_scale
 
     def _toward_home(self, x: Floats, R: Floats) -> tuple[Floats, Floats]:
@@ -212,7 +216,8 @@ def best(
     about : Holds, optional
         The same with poses that are no readings, but near which the first search begins.
     """
-    starts = _Starts(with_levels(unknowns, holds), holds, holds if about is None else about, rng, progress, called)
+    near = holds if about is None else about
+    starts = _Starts(with_levels(unknowns, holds), holds, near, rng, progress, called)
     found = starts.of_file()
     found = starts.near_file(found)
     if not starts.blind:
@@ -246,7 +251,9 @@ class _Starts:
 
     def of_file(self) -> RobotPosterior:
         """From the file's geometry."""
-        return self._searched(seed(self.unknowns, self.about, np.zeros(self.unknowns.count), self.rng), 1)
+        white = np.zeros(self.unknowns.count)
+        state = seed(self.unknowns, self.about, white, self.rng)
+        return self._searched(state, 1)
 
     def near_file(self, found: RobotPosterior) -> RobotPosterior:
         """From other geometries: first what was found, where holds that went astray are looked for again."""
@@ -254,7 +261,8 @@ class _Starts:
             if _explains(found):
                 break
             white = _near_file(self.unknowns, self.rng) if k > 0 else np.array(found.state.white)
-            other = self._searched(seed(self.unknowns, self.holds, white, self.rng), k + 2)
+            state = seed(self.unknowns, self.holds, white, self.rng)
+            other = self._searched(state, k + 2)
             likelier = other.evidence > found.evidence
             if likelier and not (_ended(other) or unusually_open(other)):  # only short of rounds
                 other = estimate(self.unknowns, self.holds, other.state)
@@ -320,13 +328,14 @@ def hanging_state(unknowns: Unknowns, holds: Holds, state: State) -> State:
     bare, offset = inverse.lengths(robot, holds.session.joint_m)
     zero = bare + parts.reference_m
     of_holds = wires.part(np.zeros(len(zero), int))
-    found = forward.solve_equilibrium(robot, of_holds, zero, offset, state.position_m, state.rotation)
-    position = chosen_rows(found.found, found.position_m, state.position_m)
-    turn = chosen_rows(found.found, found.rotation, state.rotation)
-    way = statics.stretched(robot, statics.geometry(robot, position.T, batch_last(turn)), offset.T).T
-    gap_N = of_holds.theta["k1"].T * (way / zero - 1.0)  # of slack wires negative, as latent tensions are
-    latent = np.where(found.tension_N > 0.0, found.tension_N, gap_N)
-    return State(state.white, position, turn, chosen_rows(found.found, latent, state.pull_N))
+    balance = forward.solve_equilibrium(robot, of_holds, zero, offset, state.position_m, state.rotation)
+    position = chosen_rows(balance.found, balance.position_m, state.position_m)
+    turn = chosen_rows(balance.found, balance.rotation, state.rotation)
+    strain = statics.stretched_at(robot, position, turn, offset) / zero - 1.0
+    by_strain = of_holds.theta["k1"].T * strain  # of slack wires negative, as latent tensions are
+    latent = np.where(balance.tension_N > 0.0, balance.tension_N, by_strain)
+    pull = chosen_rows(balance.found, latent, state.pull_N)
+    return State(state.white, position, turn, pull)
 
 
 def near_requests(unknowns: Unknowns, holds: Holds) -> Holds:
@@ -340,14 +349,14 @@ def near_requests(unknowns: Unknowns, holds: Holds) -> Holds:
     """
     robot, session = unknowns.robot, holds.session
     bare, offset = inverse.lengths(robot, session.joint_m)
-    shape = statics.geometry(robot, session.position_m.T, batch_last(session.rotation))
-    gap = statics.stretched(robot, shape, offset.T).T - bare
+    gap = statics.stretched_at(robot, session.position_m, session.rotation, offset) - bare
     largest = np.abs(gap / robot.lines).max(1)
     near = largest < _ASTRAY * robot.span_m + _OFF * unknowns.prior.reference_sd_m
     lost = session.without_poses()
     position = chosen_rows(near, session.position_m, lost.position_m)
     rotation = chosen_rows(near, session.rotation, lost.rotation)
-    return replace(holds, session=replace(session, position_m=position, rotation=rotation))
+    some_lost = replace(session, position_m=position, rotation=rotation)
+    return replace(holds, session=some_lost)
 
 
 def _near_file(unknowns: Unknowns, rng: Generator) -> Floats:

@@ -57,31 +57,31 @@ def differing_wires(unknowns: Unknowns, white: Floats) -> Wires:
 
 def _directions(unknowns: Unknowns) -> Floats:
     """(c, d) which unknowns each column of `differing_wires` changes."""
-    legs, prior = unknowns.robot.legs, unknowns.prior
-    p, own = len(prior.names), len(prior.own)
-    out = np.zeros((p + own, len(unknowns.moments[0])))
-    out[np.arange(p), legs + np.arange(p)] = 1.0
+    legs = unknowns.robot.legs
+    shared = len(unknowns.prior.names)
+    own = len(unknowns.prior.own)
+    out = np.zeros((shared + own, unknowns.of_wires))
+    for k in range(shared):
+        out[k, legs + k] = 1.0
     for k in range(own):
-        first = legs + p + k * legs
-        out[p + k, first : first + legs] = 1.0
+        first = legs + shared + k * legs
+        out[shared + k, first : first + legs] = 1.0
     return out
 
 
 def by_unknown(unknowns: Unknowns, values: Floats) -> Floats:
     """Slopes ``(p, w, d)`` of values ``(p, w, 1 + 2 c)`` at the columns of `differing_wires`."""
     legs = unknowns.robot.legs
-    p = len(unknowns.prior.names)
-    c = (values.shape[2] - 1) // 2
-    up = values[..., 1 : 1 + c]
-    down = values[..., 1 + c :]
+    shared = len(unknowns.prior.names)
+    up, down = np.split(values[..., 1:], 2, axis=2)
     slope = (up - down) / (2 * _STEP)
-    out = np.zeros((*values.shape[:2], len(unknowns.moments[0])))
-    first_own = legs + p
-    out[..., legs:first_own] = slope[..., :p]
+    out = np.zeros((*values.shape[:2], unknowns.of_wires))
+    first_own = legs + shared
+    out[..., legs:first_own] = slope[..., :shared]
     leg = np.arange(legs)
-    for k in range(c - p):
+    for k in range(len(unknowns.prior.own)):
         own = first_own + k * legs + leg
-        out[:, leg, own] = slope[..., p + k]
+        out[:, leg, own] = slope[..., shared + k]
     return out
 
 
@@ -109,14 +109,13 @@ def grown(
         Whether slopes by the tension of every hold are wanted. Else those by all tensions together are taken for
         slopes by the hold's own.
     """
+    holds = len(pull_N)
+    if not unknowns.prior.creeps:
+        return no_creep(unknowns, holds)
     wires = differing_wires(unknowns, white)
     columns = _count(wires)
-    if not unknowns.prior.creeps:
-        strain = np.zeros((*pull_N.shape, columns))
-        by_pull = np.zeros((len(pull_N), *pull_N.shape))
-        return Grown(strain[..., 0], by_unknown(unknowns, strain), by_pull)
-    holds = len(pull_N)
-    changes = np.eye(holds) if each else np.ones((holds, 1))  # which holds' tensions every further column changes
+    own_hold = np.eye(holds)
+    changes = own_hold if each else np.ones((holds, 1))  # which holds' tensions every further column changes
     rows = np.concatenate([np.arange(columns), np.zeros(changes.shape[1], int)])
     factor = np.ones((holds, 1, len(rows)))
     factor[:, 0, columns:] += _LOAD * changes
@@ -124,8 +123,16 @@ def grown(
     strain, course = crept(wires.part(rows), loaded(tensions), known)
     by_wires = by_unknown(unknowns, strain[..., :columns])
     change = strain[..., columns:] - strain[..., :1]
-    by_pull = _by_pull(change if each else change * np.eye(holds)[:, None], pull_N)
-    return Grown(strain[..., 0], by_wires, by_pull, course)
+    if not each:
+        change = change * own_hold[:, None]
+    return Grown(strain[..., 0], by_wires, _by_pull(change, pull_N), course)
+
+
+def no_creep(unknowns: Unknowns, holds: int) -> Grown:
+    """Wires that do not creep, whatever their tensions."""
+    legs = unknowns.robot.legs
+    by_wires = np.zeros((holds, legs, unknowns.of_wires))
+    return Grown(np.zeros((holds, legs)), by_wires, np.zeros((holds, holds, legs)))
 
 
 def _by_pull(change: Floats, pull_N: Floats) -> Floats:

@@ -96,6 +96,11 @@ class Unknowns:
         mean, covariance = self.prior.moments(self.robot.legs)
         return mean, np.asarray(np.linalg.cholesky(covariance), np.float64)
 
+    @property
+    def of_wires(self) -> int:
+        """How many unknowns are references, wires and sensors."""
+        return len(self.moments[0])
+
     @cached_property
     def slices(self) -> dict[str, slice]:
         """Where exit points, platform points, drums, references with wires and sensors (``wires``) and levels stand.
@@ -107,7 +112,7 @@ class Unknowns:
             "exit": 3 * legs if self.errors.exit_m > 0 else 0,
             "platform": 3 * legs if self.errors.platform_m > 0 else 0,
             "drum": self.robot.joints if self.errors.drum > 0 else 0,
-            "wires": len(self.moments[0]),
+            "wires": self.of_wires,
             "level": legs if self.errors.level_N > 0 else 0,
         }
         return one_after_another(counts)

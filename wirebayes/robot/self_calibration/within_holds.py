@@ -172,7 +172,7 @@ def _through(wires: Wires, loaded: Loaded, course: TensionCourse) -> _Through:
 
 @dataclass(frozen=True)
 class _Held:
-    """One hold's part of `_Through`, and what it leaves to the next."""
+    """One hold's part of `_Through`, and the `state` of the wires that it leaves to the next."""
 
     strain: Floats
     off: Floats
