@@ -59,7 +59,7 @@ def stored(kind: type, folder: Path, name: str, content: dict[str, Any]) -> Any:
 def test_an_effect_is_spoken_of_in_words_with_its_hold() -> None:
     assert spoken("tension_dependent_rate") == "tension dependent rate"
     assert spoken("grip_slip@7") == "grip slip at hold 7"
-    assert spoken("discrepancy@13:0.1:60.0") == "discrepancy"
+    assert spoken("discrepancy@13:0.1:60.0:1.0:12.0") == "discrepancy"
     assert spoken("unknown") == "something unknown"
 
 

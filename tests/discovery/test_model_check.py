@@ -107,7 +107,7 @@ def test_what_cannot_be_checked_says_so(tmp_path: Path) -> None:
     experiment = simulated(tmp_path)
     for job in (
         Job("", (experiment,), spec=ModelSpec(likelihood="hold")),
-        Job("", (experiment,), ("discrepancy@7:0.1:120.0",)),
+        Job("", (experiment,), ("discrepancy@7:0.1:120.0:1.0:6.0",)),
     ):
         check = check_model(job)
         assert check.passed is None and check.p is None and check.to_dict()["passed"] is None

@@ -96,13 +96,14 @@ def test_an_event_of_another_test_and_a_comparison_of_lengths_do_not_act_on_one_
     assert shrinking.acting_alone([slip, elsewhere, anywhere, lengths], one) == (slip, anywhere)  # type: ignore[list-item]
 
 
-def test_a_discrepancy_is_as_slow_as_the_holds_are_long() -> None:
+def test_a_discrepancy_is_as_slow_as_the_holds_are_long_and_spans_what_is_set() -> None:
     one = experiments()[0]
-    holds = [replace(h, duration_s=seconds) for h, seconds in zip(one.holds, (150.0, 600.0, 200.0), strict=False)]
+    long = zip(one.holds, (150.0, 600.0, 200.0), (2.0, 5.0, 3.0), strict=False)
+    holds = [replace(h, duration_s=seconds, setting=setting) for h, seconds, setting in long]
     found = shrinking.discrepancy(replace(one, holds=tuple(holds)), 0.3)
-    assert found == type(found)(3, 0.3, 200.0)
+    assert found == type(found)(3, 0.3, 200.0, 2.0, 3.0)
     at_once = [replace(h, time_s=0.0 * h.time_s, duration_s=0.0) for h in holds]
-    assert shrinking.discrepancy(replace(one, holds=tuple(at_once)), 0.3) == type(found)(3, 0.3, 1.0)
+    assert shrinking.discrepancy(replace(one, holds=tuple(at_once)), 0.3) == type(found)(3, 0.3, 1.0, 2.0, 3.0)
 
 
 class Model(SimpleNamespace):

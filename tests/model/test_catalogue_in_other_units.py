@@ -129,8 +129,8 @@ def test_so_does_creep_that_grows_with_a_free_power_of_the_length(index: int) ->
 def test_so_does_a_smooth_remainder() -> None:
     tests = measured_at(TWO_LENGTHS)[:1]
     holds = len(tests[0].holds)
-    here = Discrepancy(holds, 0.3, 100.0)
-    there = here.in_units(SMALLER.tension_N, SMALLER.time_s)
+    here = Discrepancy(holds, 0.3, 100.0, 1.0, 7.0)
+    there = here.in_units(SMALLER.length_mm, SMALLER.tension_N, SMALLER.time_s)
     reads_the_same(build(tests, [here]), build([rewritten(test, SMALLER) for test in tests], [there]))
 
 

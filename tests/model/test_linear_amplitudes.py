@@ -15,7 +15,7 @@ from wirebayes.model.build import build
 from wirebayes.model.linear_amplitudes import MarginalisedProblem, completed, integrated
 
 WIRES = {e.name: e for e in paper.experiments()}
-UNNAMED = "discrepancy@13:0.08:120.0"
+UNNAMED = "discrepancy@13:0.08:120.0:1.0:12.0"
 
 
 def problem_of(name: str, *effects: str):

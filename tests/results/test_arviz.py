@@ -98,7 +98,7 @@ def stored(experiments: list[Experiment], tmp_path_factory: pytest.TempPathFacto
         "effects": fit_problem(
             build(short, [effect_named("thermal_expansion"), effect_named("grip_slip@4")]), 1, policy=LESS_HASTY
         ),
-        "unknown": fit_problem(build(short, [effect_named("discrepancy@8:0.3:70.0")]), 1, policy=HASTY),
+        "unknown": fit_problem(build(short, [effect_named("discrepancy@8:0.3:70.0:1.0:7.0")]), 1, policy=HASTY),
     }
     out = {}
     for kind, done in fits.items():

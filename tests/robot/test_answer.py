@@ -97,7 +97,7 @@ def test_creep_grows_with_the_length_as_the_joint_fit_says(name, leg):
 def test_what_a_fit_could_not_name_is_said_to_be_missing():
     from wirebayes.effects.unknown import Discrepancy
 
-    line = draws.WireDraws(_line(3, 800.0).parameters, 1000.0, effects=(Discrepancy(5, 0.1, 120.0),))
+    line = draws.WireDraws(_line(3, 800.0).parameters, 1000.0, effects=(Discrepancy(5, 0.1, 120.0, 1.0, 4.0),))
     message = wire_warnings(schema.read_robot_file("linear-6"), line, np.ones((1, 6)), 1.0, np.ones((1, 6)))
     assert len(message) == 1
     assert "could not name" in message[0].text and message[0].kind == "left-out"

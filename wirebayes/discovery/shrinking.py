@@ -325,10 +325,13 @@ def acting_alone(effects: Sequence[Effect], experiment: Experiment) -> tuple[Eff
     return tuple(e for e in effects if not e.compares_lengths and e.acts_on(*here))
 
 
-def discrepancy(experiment: Experiment, size_N: float) -> Discrepancy:
-    """What stands for something unknown in an experiment, where it leaves over `size_N`."""
+def discrepancy(experiment: Experiment, size: float) -> Discrepancy:
+    """What stands for something unknown in an experiment, where it leaves over `size` of the readings, N or mm."""
     durations = [h.duration_s for h in experiment.recorded_holds]
-    return Discrepancy(len(experiment.holds), size_N, float(np.median(durations)) or 1.0)
+    hold_s = float(np.median(durations)) or 1.0
+    settings = [hold.setting for hold in experiment.holds]
+    least = min(settings)
+    return Discrepancy(len(settings), size, hold_s, least, max(settings) - least)
 
 
 def residual_rms(block: LaplaceFit, name: str) -> float:

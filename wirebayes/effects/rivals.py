@@ -24,7 +24,7 @@ class _WithoutPlateau(Effect):
     def formula_constant(self, typical: Typical) -> float:
         return self.long_s
 
-    def in_units(self, tension: float, time: float) -> "_WithoutPlateau":
+    def in_units(self, set_: float, read: float, time: float) -> "_WithoutPlateau":
         return replace(self, long_s=self.long_s * time)
 
     def referred(self, hold_s: float) -> "_WithoutPlateau":

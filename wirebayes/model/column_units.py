@@ -72,7 +72,7 @@ def sample_in(sample: Sample, old: Units, new: Units) -> Sample:
     )
     changed = replace(
         model,
-        effects=tuple(effect.in_units(tension, time) for effect in model.effects),
+        effects=tuple(effect.in_units(set_, read, time) for effect in model.effects),
         tension_ref_N=model.tension_ref_N * tension,
         length_ref_mm=model.length_ref_mm * length,
         typical=Typical(model.typical.tension_N * tension, model.typical.hold_s * time),

@@ -44,6 +44,7 @@ def steady_hold(
         index=index,
         recorded=True,
         order=float(index),
+        setting=0.0,
         displacement_mm=0.0,
         direction=1,
         first_direction=1,

@@ -104,6 +104,8 @@ class HoldContext:
         False for a hold of which no reading was kept.
     order : float
         The hold's number; an unrecorded hold lies half a number below the one it precedes.
+    setting : float
+        What is set in this hold: the displacement, mm, or the tension, N.
     displacement_mm : float or (R, n) array
         Of this hold; where the tension is set, what follows from it, once that is known.
     direction, first_direction : int
@@ -135,6 +137,7 @@ class HoldContext:
     index: int
     recorded: bool
     order: float
+    setting: float
     displacement_mm: Any
     direction: int
     first_direction: int
@@ -269,8 +272,14 @@ class Effect:
         """
         return self.control in (None, control)
 
-    def in_units(self, tension: float, time: float) -> "Effect":
-        """The effect where tensions and times are multiplied by these numbers; itself unless it has such constants."""
+    def in_units(self, set_: float, read: float, time: float) -> "Effect":
+        """The effect where numbers are multiplied by these; itself unless it has such constants.
+
+        Parameters
+        ----------
+        set_, read, time : float
+            Factors of what is set in a hold, of what is read, and of times.
+        """
         return self
 
     def referred(self, hold_s: float) -> "Effect":

@@ -154,6 +154,7 @@ class Protocol:
                     "index": j,
                     "recorded": bool(recorded[j]),
                     "order": self._order(j),
+                    "setting": float(setting),
                     "displacement_mm": float(setting) if self.control == "displacement" else np.nan,
                     "direction": int(directions[j]),
                     "first_direction": int(directions[0]),
