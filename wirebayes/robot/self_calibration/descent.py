@@ -161,21 +161,22 @@ class _Target:
             return replace(here, cost=np.inf)
         there = self.at(_stepped(robot, here.state, change, hold))
         white = there.state.white
-        foreseen = _foreseen(here.equations, change, hold) + float(white @ white)
-        least_gain = _AS_FORESEEN * (here.cost - foreseen)
+        goal = _foreseen(here.equations, change, hold)
+        least_gain = _AS_FORESEEN * (here.cost - float((goal**2).sum() + white @ white))
         for _ in range(_CORRECTIONS):
             if here.cost - there.cost > least_gain:
                 break
-            there = self.corrected(there)
+            there = self.corrected(there, goal)
         return there
 
-    def corrected(self, here: _Place) -> _Place:
-        """Poses and tensions a Newton step nearer to where each hold has them for the same robot, where that is better.
+    def corrected(self, here: _Place, goal: Floats) -> _Place:
+        """Poses and tensions a Newton step nearer to the residuals that a step was to lead to, where that is better.
 
-        Loops and balance leave a narrow, curved valley; a step along its slope leaves it, and this leads back.
+        Loops and balance leave a narrow, curved valley; a step along its slope leaves it, and this leads back across
+        it. Not to where the hold is best: that lies farther along the valley, round its next bend.
         """
         e, state = here.equations, here.state
-        slope = e.by_hold.mT @ e.residual[..., None]
+        slope = e.by_hold.mT @ (e.residual - goal)[..., None]
         hold = -solve(own_normal(e.by_hold, 1e-12), slope)[..., 0]
         there = _stepped(self.unknowns.robot, state, np.zeros_like(state.white), np.nan_to_num(hold))
         ahead = self.equations(there)
@@ -217,7 +218,7 @@ def _stepped(robot: Robot, state: State, change: Floats, hold: Floats) -> State:
     return State(state.white + change, state.position_m + motion[:, :3], turn, state.pull_N + hold[:, d:])
 
 
-def _foreseen(e: Equations, change: Floats, hold: Floats) -> float:
-    """Sum of squares of the residuals after a step, were they straight."""
+def _foreseen(e: Equations, change: Floats, hold: Floats) -> Floats:
+    """(p, k) residuals after a step, were they straight."""
     moved_by = e.by_robot @ change + (e.by_hold @ hold[..., None])[..., 0]
-    return float(((e.residual + moved_by) ** 2).sum())
+    return e.residual + moved_by
