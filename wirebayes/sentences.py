@@ -33,7 +33,9 @@ def counted(count: int, what: str) -> str:
 
 
 def lasting(seconds: float) -> str:
-    """A time as people say it: 45 s, 12 min, 24 h."""
+    """A time as people say it: 45 s, 12 min, 24 h, 25 days."""
+    if seconds >= _IN_DAYS:
+        return f"{short(seconds / _DAY, 3)} days"
     unit, size = unit_of_time(seconds)
     return f"{short(seconds / size, 3)} {unit}"
 
@@ -50,6 +52,8 @@ def to_be_held(seconds: float) -> str:
     return f"{short(exact / size)} {unit}"
 
 
+_DAY = 86400.0  # s
+_IN_DAYS = 3.0 * _DAY  # from here on people do not say a time in hours
 _TIMES = (("h", 3600.0), ("min", 60.0), ("s", 1.0))  # s, the longest first
 
 

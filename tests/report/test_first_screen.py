@@ -130,8 +130,8 @@ def test_a_batch_does_not_say_of_undecided_effects_that_each_is_missing() -> Non
 
 
 def test_times_are_said_in_the_unit_that_people_use() -> None:
-    said = [sentences.lasting(seconds) for seconds in (0.5, 59.0, 60.0, 3599.0, 3600.0, 86400.0)]
-    assert said == ["0.5 s", "59 s", "1 min", "60 min", "1 h", "24 h"]
+    said = [sentences.lasting(seconds) for seconds in (0.5, 59.0, 60.0, 3599.0, 3600.0, 86400.0, 3 * 86400.0, 2.16e6)]
+    assert said == ["0.5 s", "59 s", "1 min", "60 min", "1 h", "24 h", "3 days", "25 days"]
 
 
 def test_times_to_be_set_are_whole_numbers_of_the_longest_unit_or_stay_seconds() -> None:

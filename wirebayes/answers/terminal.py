@@ -23,6 +23,7 @@ from wirebayes.json_files.values import Quantiles
 from wirebayes.result_warnings import warns_of
 from wirebayes.sentences import (
     counted,
+    lasting,
     likely,
     listed,
     p_in_words,
@@ -271,7 +272,7 @@ def _recorded(test: CheckedExperiment, unit: str) -> str:
     many = f"{counted(test['recorded_holds'], 'hold')}, {counted(test['readings'], 'reading')}"
     step = read_value(test, "resolution")
     steps = f", written in steps of {step:g} {unit}" if step else ""
-    return f"{many} in {short(test['duration_s'] / 60.0, 3)} min{steps}"
+    return f"{many} in {lasting(test['duration_s'])}{steps}"
 
 
 def _determined(test: CheckedExperiment) -> list[str]:

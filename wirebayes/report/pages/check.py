@@ -31,7 +31,7 @@ from wirebayes.report.cells import NONE, unit_or_dash
 from wirebayes.report.drawn import embedded
 from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.result_warnings import warns_of
-from wirebayes.sentences import counted, spoken
+from wirebayes.sentences import counted, lasting, spoken
 
 _FILES = (
     ("import.json", "what was decided, as JSON"),
@@ -113,7 +113,7 @@ def _about(experiment: CheckedExperiment) -> list[str]:
     about = [
         f"{experiment['material']}, {number(experiment['length_mm'])} mm.",
         f"{holds}, {counted(experiment['readings'], 'reading')}.",
-        f"{number(experiment['duration_s'] / 60.0)} min in all.",
+        f"{lasting(experiment['duration_s'])} in all.",
     ]
     ends = experiment.get("hold_ends")
     if ends and not warns_of(experiment, "hold-ends"):
