@@ -46,6 +46,7 @@ _PATIENT, _HOPELESS = 5, 0.1
 # as long go to and fro: slopes by every tension then lead on.
 _STALLED, _NEARER = 10, 0.9
 _SOFT = 0.03  # of what is known best of tensions
+_BEND = 3.0  # times that range: within it a wire is neither taut nor slack, which hardly any wire is
 _WHOLE_ROUNDS = 3  # before creep goes half the way only
 _STILL = 0.05  # of every unknown's standard deviation
 _STEADY = 10.0  # creep may err as many times more as unknowns move by tenths of a standard deviation
@@ -106,6 +107,18 @@ def estimate(
     others_follow : bool
         Whether other starts follow: a search whose loops stay open unusually far then makes way for them.
     """
+    found = _searched(unknowns, holds, state, progress, others_follow)
+    if found.converged and _stuck(found, holds):
+        freed = _searched(unknowns, holds, found.state, progress, others_follow)
+        found = freed if freed.converged and freed.evidence > found.evidence else found
+    progress(1.0)
+    return found
+
+
+def _searched(
+    unknowns: Unknowns, holds: Holds, state: State, progress: ShareDone, others_follow: bool
+) -> RobotPosterior:
+    """What one search finds from a rough guess."""
     noise = _before_reading(unknowns, holds)
     creep = creep_of(unknowns, holds, state, roughly=ROUGHLY)
     state = _from_rough(unknowns, holds, noise, state, creep)
@@ -113,8 +126,16 @@ def estimate(
         noise = _noise_at(unknowns, holds, noise, state, creep)
     search = _Search(unknowns, holds, noise, state, creep, others_follow)
     found = search.at_rest(progress)
-    progress(1.0)
     return replace(found, converged=found.converged and not lost(found))
+
+
+def _stuck(found: RobotPosterior, holds: Holds) -> bool:
+    """Whether a wire that was read lies where it begins to pull: slopes change there, and steps lead to no lower sum.
+
+    Balance, eased, leads on from there.
+    """
+    read = np.isfinite(holds.tension_N)
+    return bool((np.abs(found.state.pull_N[read]) < _BEND * found.noise.soft_N).any())
 
 
 def _noise_at(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown) -> Noise:
