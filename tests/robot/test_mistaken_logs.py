@@ -11,11 +11,11 @@ from scipy.optimize import brentq
 from tests.robot.test_unheld_home import six_wires
 from wirebayes.errors import InputError
 from wirebayes.robot.history import table
-from wirebayes.robot.mechanics import statics
+from wirebayes.robot.mechanics import schema, statics
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration.mistaken import tension_notices
+from wirebayes.robot.self_calibration.mistaken import column_notices, tension_notices
 from wirebayes.robot.self_calibration.session_file import POSITION, TURN, may_be_empty, parse_session
 from wirebayes.strict.columns import columns_table
 from wirebayes.strict.table import csv_table
@@ -223,3 +223,17 @@ def test_tensions_that_no_factor_balances_are_not_in_another_unit(session, uneve
     scaled = cells | {f"tension_{i + 1}_N": tau[:, i] for i in range(6)}
     with pytest.raises(InputError) if refused else contextlib.nullcontext():
         _read(robot, scaled, biased=True)
+
+
+def test_columns_of_a_robot_on_a_table_are_compared_by_what_wires_pull():
+    """Its table carries the weight: no unit can be told, but two columns in the place of each other can."""
+    robot = schema.read_robot_file("sled-4")
+    x = robot.home_m + np.array([[-0.2, 0.1, 0.0], [0.1, -0.1, 0.0], [0.05, 0.08, 0.0], [-0.1, -0.15, 0.0]])
+    turn = np.tile(np.eye(3), (4, 1, 1))
+    tau = inverse.tensions(robot, x, turn) * np.array([1.0, 3.0, 2.0, 5.0])[:, None]
+    with np.errstate(all="raise"):
+        assert column_notices(robot, x, turn, tau) == []
+        assert column_notices(robot, x, turn, 4.4 * tau) == []
+        (said,) = column_notices(robot, x, turn, tau[:, [0, 2, 1, 3]])
+    assert said.text.startswith("columns tension_2_N and tension_3_N: found tensions that leave")
+    assert "of what they pull unbalanced" in said.text

@@ -154,7 +154,7 @@ def _mixed_up(balance: "_Balance", names: Sequence[str]) -> tuple[str, str, str]
     for i, j in combinations(range(len(names)), 2):
         other = balance.left(balance.pull(_swapped(len(names), i, j)))
         if _BETTER * other < left:
-            found = f"tensions that leave {short(100 * left, 2)} % of the weight unbalanced"
+            found = f"tensions that leave {short(100 * left, 2)} % of {balance.whole} unbalanced"
             return f"columns {names[i]} and {names[j]}", found, _in_place(f"{short(100 * other, 2)} %")
     return None
 
@@ -191,13 +191,21 @@ class _Balance:
         """What wires pull whose tensions stand in this order."""
         return self.scale * (self.structure * self.tension_N[:, order].T).sum(1)
 
+    @property
+    def whole(self) -> str:
+        """Of what a share is left unbalanced: a level table carries the weight, and wires pull against each other."""
+        return "the weight" if self.load.any() else "what they pull"
+
     def left(self, pull: Floats) -> float:
-        """What is left unbalanced, of the load."""
-        """What is left unbalanced, of the load."""
-        return float(np.linalg.norm(pull - self.load) / np.linalg.norm(self.load))
+        """What is left unbalanced, of the load or of what wires pull."""
+        of_each = self.scale[:, None] * self.structure * self.tension_N.T
+        unit = np.linalg.norm(self.load if self.load.any() else of_each)
+        return float(np.linalg.norm(pull - self.load) / max(float(unit), 1e-300))
 
     def times(self, pull: Floats) -> float:
-        """The factor by which a pull is to be multiplied to balance the load best."""
+        """The factor by which a pull is to be multiplied to balance the load best; 1 where any balances no load."""
+        if not self.load.any():
+            return 1.0
         along = (pull * self.load).sum()
         return float(along / max((pull * pull).sum(), 1e-300))
 
