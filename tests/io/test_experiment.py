@@ -387,6 +387,18 @@ def test_small_slack_and_large_tensions_are_read(tmp_path, tension):
     assert len(checked_readings(readings_table(staircase(tmp_path, lambda h: (0, 30, 60), tension)), 1000.0)) == 4
 
 
+@pytest.mark.parametrize("key", ['prior."toe.w"', "prior.toe.w"])
+def test_a_prior_of_an_effect_is_a_table_with_or_without_quotes(experiment_file, key):
+    path = experiment_file()
+    own = f"[{key}]\nfixed = 2.0\n\n"
+    path.write_text(own + path.read_text())
+    (test,) = read_experiments(path)
+    assert test.priors == {"toe.w": {"fixed": 2.0}} and test.prior_lines["toe.w"] == 1
+    both = '[prior]\n"toe.w" = { fixed = 1.0 }\ntoe.w = { fixed = 2.0 }\n\n'
+    path.write_text(path.read_text().replace(own, both))
+    assert "prior.toe.w: found it a second time, expected one prior of each parameter" in complaint(path)
+
+
 def test_priors_are_kept_as_written_the_experiments_own_over_the_files(experiment_file):
     head = "[prior.k1]\nlow = 1.0\n[prior.U]\nlow = 0.1\n[[experiment]]"
     path = experiment_file({"[[experiment]]": head})

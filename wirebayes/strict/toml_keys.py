@@ -254,15 +254,24 @@ class Keys:
         return numbers
 
     def priors(self) -> dict[str, dict[str, Any]]:
-        """The ``[prior]`` table, left as written: what a prior may say is known to the statistics alone."""
+        """The ``[prior]`` table by parameter: what a prior may say is known to the statistics alone.
+
+        ``[prior.toe.w]`` is a table in a table to TOML, and the same as ``[prior."toe.w"]`` here.
+        """
         tables = self.table.get("prior", {})
         expected = "a table of tables, one for each parameter"
         if not isinstance(tables, dict):
             raise self.complain("prior", shown(tables), expected)
+        found: dict[str, dict[str, Any]] = {}
         for name, table in tables.items():
             if not isinstance(table, dict):
                 raise self.complain(f"prior.{name}", shown(table), "a table, such as { fixed = 1.0 }")
-        return tables
+            of_effect = bool(table) and all(isinstance(inner, dict) for inner in table.values())
+            own = {f"{name}.{parameter}": inner for parameter, inner in table.items()} if of_effect else {name: table}
+            for parameter in found.keys() & own.keys():
+                raise self.complain(f"prior.{parameter}", "it a second time", "one prior of each parameter")
+            found |= own
+        return found
 
 
 def line_of(text: str, key: str, index: int | None, kind: str) -> int:
