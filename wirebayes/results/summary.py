@@ -37,7 +37,9 @@ def band(values: Array) -> Statistics | None:
     if not np.isfinite(values).all():
         return None
     low, middle, high = interval(values)
-    return {"mean": float(values.mean()), "sd": float(values.std(ddof=1)), "q05": low, "q50": middle, "q95": high}
+    with np.errstate(over="ignore"):  # the square of a creep time that is all but endless
+        sd = float(values.std(ddof=1))
+    return {"mean": float(values.mean()), "sd": sd, "q05": low, "q50": middle, "q95": high}
 
 
 def statistics(values: Array) -> Mixed:
