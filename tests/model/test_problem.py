@@ -162,6 +162,14 @@ def test_priors_of_the_file_replace_those_of_the_most_specific_name() -> None:
     assert build([short("a", priors=tables)]).prior.fixed == {"k1": 5.0, "preload": 0.2}
 
 
+def test_a_prior_of_an_amplitude_that_an_effect_has_not_is_refused() -> None:
+    """In silence it would count for nothing; an effect that the catalogue does not know may be a user's own."""
+    wrong = short(priors={"toe.c": {"fixed": 1.0}}, source=Path("e.toml"))
+    with pytest.raises(InputError, match=r"e\.toml: prior\.toe\.c: found no amplitude c of toe, expected toe\.w"):
+        build([wrong])
+    assert build([short(priors={"toe.w": {"fixed": 1.0}, "own.c": {"fixed": 1.0}, "toe@strain.c": {"fixed": 1.0}})])
+
+
 @pytest.mark.parametrize(("lines", "where"), [({}, "e.toml: prior.k3"), ({"k3": 7}, "e.toml, line 7: prior.k3")])
 def test_a_prior_of_no_parameter_is_refused_with_its_place(lines: dict[str, int], where: str) -> None:
     wrong = short(priors={"k3": {"fixed": 1.0}}, prior_lines=lines, source=Path("e.toml"))

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from wirebayes.effects import CATALOGUE
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment, by_material
 from wirebayes.model.column_units import parameter_of, unit_of_column
@@ -253,7 +254,20 @@ def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experimen
             elif name not in known and "." not in name:
                 expected = f"one of {', '.join(sorted(known))}, or effect.parameter"
                 raise InputError(f"{key}: found no such parameter{hint(name, sorted(known))}, expected {expected}")
+            else:
+                _check_amplitude(key, name)
     return stated
+
+
+def _check_amplitude(key: str, name: str) -> None:
+    """Refuse the prior of an amplitude that an effect of the catalogue does not have; other effects may be a user's."""
+    effect, _, amplitude = name.partition(".")
+    kind = CATALOGUE.get(effect)  # other forms, which have an @, may have other amplitudes
+    if kind is None:
+        return
+    names = [f"{effect}.{known.name}" for known in kind.amplitudes]
+    if name not in names:
+        raise InputError(f"{key}: found no amplitude {amplitude} of {effect}, expected {' or '.join(names)}")
 
 
 def _place_of_prior(experiment: Experiment, name: str) -> str:
