@@ -17,7 +17,7 @@ from scipy import stats
 from analyses.options import study_options
 from analyses.speed.checkouts import benchmark_files
 from analyses.speed.gate_cost import experiments_of, plain_fits
-from wirebayes.discovery import screening
+from wirebayes.discovery import screening, surprise
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.settings import ABOVE_COUNT, ALPHA, ONE_NAT, UPPER
 from wirebayes.effects import CATALOGUE
@@ -45,7 +45,7 @@ def values(case: str, seed: int) -> tuple[dict[str, Array], dict[str, Array]]:
 def by_counting(data: dict[str, Array], chance: dict[str, Array]) -> float:
     """p where all simulations are counted, as often as a value is exceeded."""
     null = [np.log(len(v)) - np.log(stats.rankdata(-v, method="max")) for v in chance.values()]
-    found = max(float(screening.empirical_surprise(data[name][0], v)) for name, v in chance.items())
+    found = max(float(surprise.empirical_surprise(data[name][0], v)) for name, v in chance.items())
     return float((1 + (np.max(null, axis=0) >= found).sum()) / (1 + len(null[0])))
 
 
@@ -78,7 +78,7 @@ def main() -> None:
             for way in ("counted", *WAYS):
                 upper, one_nat, above = WAYS.get(way, WAYS["as it is"])
                 with (
-                    patch.multiple(screening, UPPER=upper, ONE_NAT=one_nat, ABOVE_COUNT=above),
+                    patch.multiple(surprise, UPPER=upper, ONE_NAT=one_nat, ABOVE_COUNT=above),
                     patch.object(screening, "by_name", lambda candidates, scans: scans),
                 ):
                     p, low = spread(data, chance, lot, way)

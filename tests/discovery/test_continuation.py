@@ -17,7 +17,8 @@ from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.name_evidence import weigh_names
 from wirebayes.discovery.noise_integral import RATIOS
 from wirebayes.discovery.scans import Scan
-from wirebayes.discovery.screening import GlobalTest, Scale
+from wirebayes.discovery.screening import GlobalTest
+from wirebayes.discovery.surprise import Scale, empirical_surprise
 from wirebayes.discovery.tangent import Tangent, moving_columns
 from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
@@ -372,9 +373,5 @@ def test_a_path_surprises_as_much_as_both_the_line_and_the_count_say() -> None:
     rng = np.random.default_rng(0)
     short, long = rng.exponential(size=999), rng.standard_cauchy(size=999)
     few = np.minimum(short, 4.0)  # by chance, none of some eighteen that should exceed it
-    assert continuation._surprise(4.5, few) == Scale.of(few).surprise(4.5) < screening.empirical_surprise(4.5, few)
-    assert (
-        continuation._surprise(100.0, long)
-        == screening.empirical_surprise(100.0, long)
-        < Scale.of(long).surprise(100.0)
-    )
+    assert continuation._surprise(4.5, few) == Scale.of(few).surprise(4.5) < empirical_surprise(4.5, few)
+    assert continuation._surprise(100.0, long) == empirical_surprise(100.0, long) < Scale.of(long).surprise(100.0)

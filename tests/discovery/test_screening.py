@@ -9,7 +9,8 @@ from scipy import stats
 
 from wirebayes.discovery import screening
 from wirebayes.discovery.linear_scan import expand
-from wirebayes.discovery.screening import Scale, candidate_probes
+from wirebayes.discovery.screening import candidate_probes
+from wirebayes.discovery.surprise import Scale, empirical_surprise
 from wirebayes.effects import CATALOGUE
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.paper import experiments
@@ -62,7 +63,7 @@ def test_p_depends_less_on_the_simulations_drawn_than_by_counting(monkeypatch: p
 
     def by_counting(chance: dict[str, np.ndarray]) -> float:
         null = np.max([np.log(999) - np.log(stats.rankdata(-v)) for v in chance.values()], axis=0)
-        return float((1 + (null >= screening.empirical_surprise(data["0"], chance["0"])).sum()) / 1000)
+        return float((1 + (null >= empirical_surprise(data["0"], chance["0"])).sum()) / 1000)
 
     counts = np.array([by_counting(chance) for chance in drawn])
     share = 1.0 - (1.0 - 0.004) ** 15

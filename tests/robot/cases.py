@@ -6,6 +6,7 @@ import numpy as np
 
 from wirebayes.robot.export.mujoco_model import mjcf
 from wirebayes.robot.mechanics import rotation, schema, statics
+from wirebayes.robot.mechanics.joint_columns import POSITION, TURN
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.self_calibration import session_file
@@ -18,7 +19,7 @@ def session_header(robot, given=()):
     """Columns of a session with poses and tensions, in the order of the docs."""
     hold, duration, *joints = session_file.columns(robot, given).required
     tensions = [f"tension_{i + 1}_N" for i in range(robot.legs)]
-    return [hold, *session_file.POSITION, *session_file.TURN, duration, *joints, *tensions]
+    return [hold, *POSITION, *TURN, duration, *joints, *tensions]
 
 
 @dataclass

@@ -13,10 +13,11 @@ from wirebayes.errors import InputError
 from wirebayes.robot.history import table
 from wirebayes.robot.mechanics import schema, statics
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
+from wirebayes.robot.mechanics.joint_columns import POSITION, TURN
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.mistaken import column_notices, tension_notices
-from wirebayes.robot.self_calibration.session_file import POSITION, TURN, may_be_empty, parse_session
+from wirebayes.robot.self_calibration.session_file import may_be_empty, parse_session
 from wirebayes.strict.columns import columns_table
 from wirebayes.strict.table import csv_table
 

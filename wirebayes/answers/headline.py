@@ -186,13 +186,16 @@ def comparison_in_words(name: str, table: ComparedModels) -> str:
     if not scored:
         return f"{name}: no model could be judged."
     best, *others = scored
-    model, base = best["name"], table["base"]
+    model = best["name"]
+    base = table["base"]
     text = f"{name}: {spoken(model)} predicts left-out holds best"
-    gain, against = best["difference"], base
+    gain = best["difference"]
+    against = base
     loss = others[0]["difference"] if others else None
     if model == base and loss is not None:  # all others are compared with it: what it is ahead of is the next
         second, *others = others
-        gain, against = {**loss, "elpd": -loss["elpd"]}, spoken(second["name"])
+        gain = {**loss, "elpd": -loss["elpd"]}
+        against = spoken(second["name"])
     if gain is not None and against != model:
         text += f", {_ahead(gain)} against {against}"
         text += "" if is_more_than_chance(gain) else ", which may be chance"
@@ -206,7 +209,8 @@ def comparison_in_words(name: str, table: ComparedModels) -> str:
 
 def _ahead(gain: Difference) -> str:
     """How much better a model predicts."""
-    elpd, error = number(gain["elpd"], 2), number(gain["se"], 2)
+    elpd = number(gain["elpd"], 2)
+    error = number(gain["se"], 2)
     return f"by {elpd} ± {error} elpd (log probability of their readings)"
 
 

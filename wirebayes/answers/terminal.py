@@ -72,7 +72,8 @@ def _parameters(summary: SummaryJson, title: str, wanted: Sequence[str]) -> list
 
 def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     """Lines about one experiment that something may be missing in: what, how large, and what it is worth."""
-    verdict, effects = report["verdict"], report["effects"]
+    verdict = report["verdict"]
+    effects = report["effects"]
     missing = _verdict(report)
     sure = p_in_words(report["p_global"], report["p_simulations"])
     lines = [f"{name}: {missing} ({sure})"]
@@ -147,7 +148,8 @@ def of_import(name: str, test: ImportedExperiment) -> list[str]:
 
 def of_batch(found: BatchJson) -> list[str]:
     """Lines about many experiments: how many, what was found, and which stand apart."""
-    rows, far = found["experiments"], found["outliers"]
+    rows = found["experiments"]
+    far = found["outliers"]
     failed = sum(row["error"] is not None for row in rows)
     converged = sum(bool(row["converged"]) for row in rows)
     lines = [f"{counted(len(rows), 'experiment')}: {converged} converged, {failed} failed"]
@@ -224,7 +226,8 @@ def of_plan(row: JudgedProtocol) -> list[str]:
     """Lines about a planned test: its rank and length, and what would be known afterwards."""
     budget = "" if row["within_budget"] else ", longer than the available time"
     name = f"{row['rank']}. {row['name']}"
-    minutes, bits = short(row["duration_min"], 3), short(row["information_bits"], 3)
+    minutes = short(row["duration_min"], 3)
+    bits = short(row["information_bits"], 3)
     lines = [f"{name}: {minutes} min{budget}, {bits} bits"]
     expected = ", ".join(_expected(row))
     lines.append(f"  expected sd: {expected}")
@@ -310,7 +313,8 @@ def _course(hold: HoldUnderstood, unit: str) -> str:
     """What was read in a hold."""
     if hold["number"] is None or hold["first_s"] is None:
         return "none: held, not recorded"
-    first, last = read_value(hold, "first"), read_value(hold, "last")
+    first = read_value(hold, "first")
+    last = read_value(hold, "last")
     return f"{hold['readings']} from {short(hold['first_s'])} s on, {short(first, 4)} to {short(last, 4)} {unit}"
 
 

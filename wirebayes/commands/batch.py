@@ -127,8 +127,10 @@ def batch(
     ['wire-1', 'wire-2']
     """
     spec = model_spec(elastic_law, history)
-    seed, train_holds = check_seed(seed), check_train_holds(train_holds)
-    own, left_out = path_of(own_effects), names_given(without)
+    seed = check_seed(seed)
+    train_holds = check_train_holds(train_holds)
+    own = path_of(own_effects)
+    left_out = names_given(without)
     catalogue_without(left_out, catalogue(own))
     read, unreadable = _read(sources, train_holds, keep_going)
     experiments = [experiment for experiment, _ in read]

@@ -134,7 +134,8 @@ def calibrate(
     >>> len(lengths.summary()["with_creep_model"]["length_m"]["mean"])
     7
     """
-    own, seed = path_of(own_effects), check_seed(seed)
+    own = path_of(own_effects)
+    seed = check_seed(seed)
     given = _GivenErrors(
         float(tension_sd), float(tilt_sd), float(reference_sd), anchor_sd, platform_sd, pose_sd, drum_sd, joint_sd
     )
@@ -278,7 +279,8 @@ def _estimated(
     progress: Progress,
 ) -> tuple[CalibrateJson, Calibrated, Robot | None]:
     """The content of ``calibration.json``, the posterior, and the robot where more than lengths is estimated."""
-    errors, poses = given.stated(robot), given.poses(read[0])
+    errors = given.stated(robot)
+    poses = given.poses(read[0])
     with computing(), np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
         found = answer.calibration_report(robot, prior, errors, *read, seed, poses, visits, progress)
     return found.content, found.known, None if given.exact else found.robot

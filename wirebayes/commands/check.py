@@ -77,7 +77,8 @@ def check(
     >>> found["effects"]["guide_friction"]["shows"]  # needs unloading
     'no'
     """
-    seed, own = check_seed(seed), path_of(own_effects)
+    seed = check_seed(seed)
+    own = path_of(own_effects)
     report = progress or silent
     experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
     kinds = catalogue(own)

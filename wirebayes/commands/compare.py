@@ -171,8 +171,10 @@ def plan_comparison(
         If an option, an experiment, its priors or the name of a model is not usable.
     """
     spec = model_spec(elastic_law, history, likelihood)
-    seed, train_holds = check_seed(seed), check_train_holds(train_holds)
-    own, names = path_of(own_effects), names_given(only)
+    seed = check_seed(seed)
+    train_holds = check_train_holds(train_holds)
+    own = path_of(own_effects)
+    names = names_given(only)
     experiments = experiments_of(source, experiment)
     known = catalogue(own)
     base = ModelToCompare(BASE, "", "The plain model.", spec)

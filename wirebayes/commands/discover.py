@@ -108,8 +108,10 @@ def discover(
     'nothing-missing'
     """
     spec = model_spec(elastic_law, history)
-    seed, train_holds = check_seed(seed), check_train_holds(train_holds)
-    own, left_out = path_of(own_effects), names_given(without)
+    seed = check_seed(seed)
+    train_holds = check_train_holds(train_holds)
+    own = path_of(own_effects)
+    left_out = names_given(without)
     experiments = experiments_of(source, experiment, train_holds=train_holds, drop_breaks=drop_breaks)
     kinds = catalogue_without(left_out, catalogue(own))
     build(experiments, (), spec)  # checks priors
@@ -126,7 +128,8 @@ def discover(
         **other_effort(policy, simulations),
     }
     settings = Settings(spec, kinds, simulations or SIMULATIONS)
-    effort, report = policy or DEFAULT, progress or silent
+    effort = policy or DEFAULT
+    report = progress or silent
     place = ResultFolder.at(output)
     with open_run(place.path, configuration) as opened:
         if opened.state == "done":
@@ -323,7 +326,8 @@ def _parameters(found: Investigation, output: Path) -> None:
         final = _parameters_of(output / name / "final")
         parameters: dict[str, ParameterReport] = {}
         for column, entry in (plain | final).items():
-            before, after = _interval(plain.get(column)), _interval(final.get(column))
+            before = _interval(plain.get(column))
+            after = _interval(final.get(column))
             parameters[column] = {"unit": entry["unit"], "plain": before, "final": after}
         report["parameters"] = parameters
 

@@ -73,7 +73,8 @@ def export(
     >>> sorted(exported.files)
     ['creep-table.csv', 'klipper.cfg', 'reprapfirmware.g', 'robot.sdf', 'robot.urdf', 'robot.xml']
     """
-    own, seed = path_of(own_effects), check_seed(seed)
+    own = path_of(own_effects)
+    seed = check_seed(seed)
     machine = robot_of(robot)
     loads = numbers("--tensions", tensions)
     moments = rising_times(times)

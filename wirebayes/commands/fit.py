@@ -116,8 +116,10 @@ def fit(
     1
     """
     spec = model_spec(elastic_law, history, likelihood)
-    seed, train_holds = check_seed(seed), check_train_holds(train_holds)
-    own, keys = path_of(own_effects), names_given(effects)
+    seed = check_seed(seed)
+    train_holds = check_train_holds(train_holds)
+    own = path_of(own_effects)
+    keys = names_given(effects)
     if together is not None and experiment is not None:
         raise InputError(f"--together {together}: found --experiment {experiment} beside it, expected one of the two")
     experiments = experiments_of(source, experiment, train_holds=train_holds, drop_breaks=drop_breaks)
@@ -127,7 +129,8 @@ def fit(
     groups = _groups(experiments, together, file)
     if together is not None:
         spec = replace(spec, length_exponent=Normal(1.0, 1.0))
-    jobs, fitted = list[Job](), list[Experiment]()
+    jobs = list[Job]()
+    fitted = list[Experiment]()
     for folder, members in groups.items():
         for effect in added:
             _check_possible(effect, members, file, known, history)

@@ -37,7 +37,8 @@ def new_experiment(folder: PathLike) -> Path:
     (8, 5)
     """
     target = Path(folder)
-    toml, readings = target / f"{NAME}.toml", target / f"{NAME}.csv"
+    toml = target / f"{NAME}.toml"
+    readings = target / f"{NAME}.csv"
     contents = {readings: CSV, toml: TOML}
     for path, content in contents.items():
         if path.exists() and not _holds(path, content):

@@ -112,7 +112,8 @@ def plan(
     True
     """
     spec = model_spec(elastic_law, history)
-    seed, own = check_seed(seed), path_of(own_effects)
+    seed = check_seed(seed)
+    own = path_of(own_effects)
     _check_tests(tests)
     if budget_min is not None:
         above_zero(("--budget-min", budget_min))

@@ -55,7 +55,9 @@ def protocol_content(
         Whose drift within an hour is foreseen.
     spec : ModelSpec
     """
-    test, expected, seen = judged.test, judged.expected, judged.sensitivity
+    test = judged.test
+    expected = judged.expected
+    seen = judged.sensitivity
     widths = expected.widths
     cosines = {f"{one} {other}": cosine for (one, other), cosine in seen.cosines.items() if one < other}
     recorded = test.recorded_holds

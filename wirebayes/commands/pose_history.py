@@ -55,7 +55,9 @@ def checked_errors(reference_sd: float, specimen_spread: float, tension_sd: floa
     InputError
         If one is not a number that it can be.
     """
-    reference_sd, tension_sd, tilt_sd = float(reference_sd), float(tension_sd), float(tilt_sd)
+    reference_sd = float(reference_sd)
+    tension_sd = float(tension_sd)
+    tilt_sd = float(tilt_sd)
     above_zero(("--tension-sd", tension_sd), ("--tilt-sd", tilt_sd))
     if not 0 <= reference_sd < np.inf:
         raise InputError(f"--reference-sd: found {reference_sd:g}, expected millimetres, 0 or more")
@@ -141,7 +143,8 @@ def pose_over_time(asked: AskedPose, option: str, given: Any, errors: Uncertain,
     InputError
         The table is wrong (line and column).
     """
-    robot, columns = asked.robot, _COLUMNS[option]
+    robot = asked.robot
+    columns = _COLUMNS[option]
     name = option[2:]
     if isinstance(given, str | os.PathLike):
         file = Path(given)

@@ -102,12 +102,14 @@ def simulate_tests(
     Experiment(wire: 1000 mm of line-1, 3 holds, 15 readings, tensions set)
     """
     spec = model_spec(elastic_law, history)
-    own, seed = path_of(own_effects), check_seed(seed)
+    own = path_of(own_effects)
+    seed = check_seed(seed)
     chosen = _parameters(parameters or {})
     found, amplitudes = _effects(effects, own)
     chosen |= amplitudes
     tests = check_whole("--tests", tests, 1)
-    sizes, moments = _numbers("--lengths", lengths), _numbers("--times", times)
+    sizes = _numbers("--lengths", lengths)
+    moments = _numbers("--times", times)
     control, path = _settings(displacements, weights, unload)
     gaps = frozenset(unrecorded)
     _check_protocol(control, path, sizes, moments, gaps)
@@ -231,7 +233,8 @@ def _check_protocol(
 
 def _check_lengths(lengths: Sequence[float]) -> None:
     """Refuse lengths that no wire has, and a length given twice."""
-    shortest, longest = min(lengths), max(lengths)
+    shortest = min(lengths)
+    longest = max(lengths)
     is_repeated = len(set(lengths)) < len(lengths)
     if shortest <= 0 or is_repeated:
         raise InputError(f"--lengths: found {text_of(lengths)!r}, expected different lengths above 0 mm")

@@ -110,7 +110,8 @@ def judge(task: Task, seed: int, policy: Policy = POLICY) -> ModelJson:
 
 
 def _scores(task: Task, seed: int, policy: Policy) -> JudgementJson:
-    candidate, name = task.candidate, task.experiment.name
+    candidate = task.candidate
+    name = task.experiment.name
     known = catalogue(task.own_effects)
     whole = task.experiment if candidate.unrecorded else task.experiment.without_unrecorded()
     recorded = len(whole.recorded_holds)
@@ -294,7 +295,8 @@ def _differences(model: ModelJson, reference: ModelJson) -> Differences:
         return out
     if model["scored"] == reference["scored"]:
         out["difference"] = _difference(model["leave_one_hold_out"], reference["leave_one_hold_out"])
-    one, other = model["held_out"], reference["held_out"]
+    one = model["held_out"]
+    other = reference["held_out"]
     if one and other:
         out["held_out_difference"] = _difference(one["free"], other["free"])
         out["given_first_difference"] = _difference(one["given_first"], other["given_first"])

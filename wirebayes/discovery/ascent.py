@@ -83,8 +83,7 @@ def start(block: LaplaceFit, z: Array, readings: Sequence[Array] | None = None) 
         nothing = np.zeros(len(y))
         return _Look(x, here, _Places(y, height, nothing, nothing))
 
-    every = np.arange(len(z))
-    best = climbs.follow(look, _Places.unseen(z), every, free, _STEPS)
+    best = climbs.follow(look, _Places.unseen(z), np.arange(len(z)), free, _STEPS)
     height = np.where(best.log_bayes == _NEVER, -np.inf, best.log_bayes)
     return Start(best.z, height, readings, degrees)
 
@@ -143,18 +142,7 @@ def _evidence(found: Sequence["_Places"], n: int) -> PathEvidence:
 
 @dataclass(frozen=True)
 class _Places:
-    """Where m climbs are.
-
-    Attributes
-    ----------
-    z : (m, d) array
-    log_bayes : (m,) array
-        Log Bayes factor there.
-    amplitude : (m,) array
-        The effect's distance from neutral.
-    norm : (m,) array
-        δ per amplitude.
-    """
+    """Places (m, d) of m climbs, and the log Bayes factor, the amplitude and δ per amplitude there, (m,) each."""
 
     z: Array
     log_bayes: Array
@@ -324,8 +312,7 @@ class _Ascent(_Climbs):
             signature = x.parameters[..., -1] / self._scale
             here = weigh(without_last(x), signature, first[rows], last[rows], self.degrees)
             log_bayes = _finite(here.height + x.prior - self.nothing[rows])
-            best_amplitude = at[rows] + here.move
-            return _Look(x, here, _Places(y, log_bayes, best_amplitude, here.norm))
+            return _Look(x, here, _Places(y, log_bayes, at[rows] + here.move, here.norm))
 
         starts = len(z) // len(alive)
         rows = np.flatnonzero(np.tile(alive, starts))

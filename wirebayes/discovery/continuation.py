@@ -22,12 +22,11 @@ from wirebayes.discovery.screening import (
     Candidate,
     GlobalTest,
     Replicates,
-    Scale,
     by_name,
-    empirical_surprise,
     shared_amplitude,
 )
 from wirebayes.discovery.settings import BY_LARGER
+from wirebayes.discovery.surprise import Scale, empirical_surprise
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.numeric.typing import Array
 from wirebayes.processes.workers import ParallelMap
@@ -87,7 +86,8 @@ class Continuation:
         data: Sequence[Scan],
         parallel_map: ParallelMap = map,
     ) -> None:
-        self._blocks, self._each = blocks, parallel_map
+        self._blocks = blocks
+        self._each = parallel_map
         self._ways = ladders(blocks, trials, candidates, data)
         found = self._strengths(self._ways, [(b.z, None) for b in blocks])
         self.log_bayes = {c: float(v[0]) for c, v in found.items()}  # of every candidate that has a ladder

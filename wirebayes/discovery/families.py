@@ -76,7 +76,8 @@ def _signatures(block: LaplaceFit, probes: Mapping[int, Probe], ratio: float, co
 
 def grouped(names: Sequence[str], cosine: Array) -> list[Family]:
     """Names, best first, in families by the (m, m) likeness of their signatures."""
-    left, out = list(range(len(names))), []
+    left = list(range(len(names)))
+    out = []
     while left:
         members = [i for i in left if i == left[0] or cosine[left[0], i] > ALIKE]
         out.append(tuple(names[i] for i in members))

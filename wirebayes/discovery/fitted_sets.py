@@ -124,7 +124,9 @@ class Fits:
     """
 
     def __init__(self, plain: list[LaplaceFit], explored: Explored, settings: Settings, rng: Generator) -> None:
-        self._explored, self._settings, self._rng = explored, settings, rng
+        self._explored = explored
+        self._settings = settings
+        self._rng = rng
         self._known: dict[Key, list[LaplaceFit]] = {frozenset(): plain}
         self._known |= {key: s.blocks for key, s in explored.fitted.items()}
 

@@ -7,7 +7,6 @@ both use it, so they give the same answer for the same readings.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import repeat
-from typing import Any
 
 from numpy.random import Generator
 from scipy.special import bdtr, bdtrc
@@ -55,7 +54,7 @@ class Gate:
     struck: list[GrossError]
     trials: list[Probe]
     candidates: list[Candidate]
-    patterns: list[Any]
+    patterns: list[list[residual_patterns.Pattern]]
     expansions: list[Expansion]
     data: list[Scan]
     nulls: list[Scan]
@@ -100,12 +99,7 @@ def examine(
     if not candidates:
         raise InputError("no effect of the catalogue could show in these holds; at least one must be left to look for")
     blocks, struck = _without_gross_errors(blocks, trials, candidates, rng)
-    patterns = []
-    expansions = []
-    for block in blocks:
-        listed, columns = residual_patterns.patterns(block.target.problem)
-        patterns.append(listed)
-        expansions.append(expand(block.target, block.z, trials, columns=columns))
+    patterns, expansions = _expanded(blocks, trials)
     data = [scan(x) for x in expansions]
     simulated: list[Replicates] = []
     larger: Continuation | None = None
@@ -127,6 +121,19 @@ def examine(
             break
     report("simulations", len(blocks), len(blocks))
     return Gate(blocks, struck, trials, candidates, patterns, expansions, data, nulls, test)
+
+
+def _expanded(
+    blocks: Sequence[LaplaceFit], trials: Sequence[Probe]
+) -> tuple[list[list[residual_patterns.Pattern]], list[Expansion]]:
+    """The patterns of each block that the residuals may have, and it linearised with these and all probes."""
+    patterns = []
+    expansions = []
+    for block in blocks:
+        listed, columns = residual_patterns.patterns(block.target.problem)
+        patterns.append(listed)
+        expansions.append(expand(block.target, block.z, trials, columns=columns))
+    return patterns, expansions
 
 
 def _larger_effects_could_decide(test: GlobalTest, alpha: float) -> bool:

@@ -208,7 +208,8 @@ class LeftOut:
     """
 
     def __init__(self, rng: Generator, parallel_map: ParallelMap) -> None:
-        self._rng, self._map = rng, parallel_map
+        self._rng = rng
+        self._map = parallel_map
         self._known: dict[int, tuple[LaplaceFit, Array]] = {}  # by id, which is taken as long as the fit is kept
 
     def of(self, fits: Sequence[LaplaceFit]) -> list[Array]:

@@ -128,13 +128,15 @@ class _LadderEnds:
 def _both_signs(probe: Probe, strength: float, blocks: Sequence[LaplaceFit]) -> list[_LadderEnds]:
     """Ladders upwards and, unless the form is one-sided, downwards; δ of one unit of amplitude is its strength."""
     raw = float(np.sqrt(sum(_raw(block, probe) for block in blocks)))
-    first, last = min(FIRST / strength, _RAW / raw), LAST / strength
+    first = min(FIRST / strength, _RAW / raw)
+    last = LAST / strength
     return [_LadderEnds(probe, sign * first, sign * last) for sign in ((1,) if probe.one_sided else (1, -1))]
 
 
 def _rungs(starts: Sequence[_LadderEnds]) -> Array:
     """(rungs, starts) amplitudes; as many for all as the widest ladder needs."""
-    first, last = [s.first for s in starts], [s.last for s in starts]
+    first = [s.first for s in starts]
+    last = [s.last for s in starts]
     widest = float(np.max(np.divide(last, first)))
     count = min(1 + int(np.ceil(np.log(widest) / np.log(_APART))), _MOST)
     return np.geomspace(first, last, count)
@@ -143,7 +145,8 @@ def _rungs(starts: Sequence[_LadderEnds]) -> Array:
 def _raw(block: LaplaceFit, probe: Probe) -> float:
     """Squared length of a unit of the effect in the readings, in standard deviations of one."""
     shapes = forms(block.target, block.z, [probe])
-    theta, total = block.theta, 0.0
+    theta = block.theta
+    total = 0.0
     for sample, shape in zip(block.target.problem.samples, shapes, strict=True):
         own = block.target.problem.parameters(theta, sample)
         variance = sample.variance(own)

@@ -103,7 +103,8 @@ def answer_material(
     if past is None:
         return MaterialAnswer(Judgement("nothing-missing"), [], [], None, _NO_REMAINDER)
     decision = past.decision
-    p, plain = gate.test.p, gate.blocks[i]
+    p = gate.test.p
+    plain = gate.blocks[i]
     before = evidence(decision, p, i)
     accepted = accepted_effects(decision, before, i)
     stages = _stages(plain, accepted, past.explored, i, rng)
@@ -114,7 +115,8 @@ def answer_material(
     found = replace(before, remainder_gain=gain)
     judgement = verdict_on(found)
     if judgement.verdict in ("nothing-missing", "unknown"):
-        accepted, stages = [], []
+        accepted = []
+        stages = []
     # beside the effects where some are accepted, else what the plain model leaves over
     retest = decision.retest
     patterns = []

@@ -161,7 +161,8 @@ def check_model(
         gate = examine([block], kinds, simulations or SIMULATIONS, rng, alpha=alpha, parallel_map=parallel_map)
     except InputError:
         return unchecked(reason="no further effect could show in these holds")
-    p, names = gate.test.p, directions(gate.test.surprises)
+    p = gate.test.p
+    names = directions(gate.test.surprises)
     failed = p <= alpha
     return ModelCheck(
         p,

@@ -131,7 +131,8 @@ def _longest_series(protocol: Protocol) -> Array:
 def _holds(setting: Array, times: Array, length_mm: float, control: Control) -> Protocol:
     """Holds at these displacements or weights, each read at these times."""
     h = len(setting)
-    time, duration = np.tile(times, (h, 1)), np.full(h, times[-1])
+    time = np.tile(times, (h, 1))
+    duration = np.full(h, times[-1])
     number = np.arange(1, h + 1)
     return Protocol(length_mm, setting, time, np.ones(time.shape, bool), duration, number, control=control)
 

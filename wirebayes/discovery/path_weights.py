@@ -161,7 +161,8 @@ def _columns(x: Tangent, signature: Array) -> tuple[Array, Bools]:
 
 def _inner_products(x: Tangent, columns: Array) -> Array:
     """(n, k, c, c) inner products of columns (n, N, c) at each noise ratio, with the prior of the parameters."""
-    n, p = len(columns), x.parameters.shape[2]
+    n = len(columns)
+    p = x.parameters.shape[2]
     levels = np.swapaxes(x.left, 1, 2) @ columns
     products = (levels[..., None] * levels[..., None, :]).reshape(*levels.shape[:2], -1)
     whole_holds = damp(x.singular[:, None], RATIOS[:, None]) @ products

@@ -70,7 +70,8 @@ def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | 
     if norm <= 0:
         return None
     prior = occam(probe.one_sided)
-    low, high = 0.0, LARGEST / norm
+    low = 0.0
+    high = LARGEST / norm
     pieces = null.pieces.of(i)
 
     def seen(amplitude: float) -> bool:

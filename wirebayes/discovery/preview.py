@@ -87,7 +87,8 @@ def preview(experiment: Experiment, kinds: Kinds, rng: Generator) -> Preview:
 def _parameters(problem: Problem, theta: Array, before: Array) -> dict[str, ParameterRange]:
     """Each parameter's range by draws (n, d) after and before the test."""
     control = problem.samples[0].protocol.control
-    known_after, known_before = problem.prior.known(theta), problem.prior.known(before)
+    known_after = problem.prior.known(theta)
+    known_before = problem.prior.known(before)
     out = {}
     for i, name in enumerate(problem.names):
         unit = unit_of(name, (), [control])

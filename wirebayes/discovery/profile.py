@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import ndtr
@@ -95,24 +95,40 @@ def top_of(profile: Profile, per_delta: float) -> Top | None:
     if not 0 < best < len(profile.amplitude) - 1:
         return None
     near = _about_best(profile)
-    amplitude, value = profile.amplitude, profile.value
-    middle, highest = amplitude[best], value[best]
-    y = value[near] - highest
+    middle = profile.amplitude[best]
+    highest = profile.value[best]
+    y = profile.value[near] - highest
     if not np.isfinite(y).all():
         return None
-    away = (amplitude[near] - middle) / per_delta
+    away = (profile.amplitude[near] - middle) / per_delta
     scale = np.abs(away).max()
-    x = away / scale
+    parabola = _falling_parabola(away / scale, y)
+    if parabola is None:
+        return None
+    return Top(
+        float(middle + parabola.summit * scale * per_delta),
+        float(per_delta * scale / np.sqrt(-2.0 * parabola.bend)),
+        float(highest + parabola.rise),
+    )
+
+
+class _Parabola(NamedTuple):
+    """Where a parabola is highest within its points, how high there, and half its second derivative."""
+
+    summit: float
+    rise: float
+    bend: float
+
+
+def _falling_parabola(x: Array, y: Array) -> _Parabola | None:
+    """The best through some points; None where it does not fall on both sides."""
     bend, slope, height = np.polyfit(x, y, 2)
     if bend >= 0:
         return None
     vertex = -0.5 * slope / bend
     summit = float(np.clip(vertex, x.min(), x.max()))
     rise = height + slope * summit + bend * summit**2
-    at_top = middle + summit * scale * per_delta
-    sd = per_delta * scale / np.sqrt(-2.0 * bend)
-    top = highest + rise
-    return Top(float(at_top), float(sd), float(top))
+    return _Parabola(summit, rise, bend)
 
 
 def _about_best(profile: Profile) -> Bools:

@@ -142,7 +142,8 @@ class _Amplitude:
         """
         main = effect.amplitudes[0]
         least, most = (float(end) for end in main.prior.support())
-        low, high = max(least, main.neutral - reach), min(most, main.neutral + reach)
+        low = max(least, main.neutral - reach)
+        high = min(most, main.neutral + reach)
         pinned = [Pinned(block, effect) for block in blocks]
         prior = pinned[0].prior
         unit = min(per_delta, _LARGEST_UNIT * finite_spread(prior))
@@ -166,7 +167,8 @@ class _Amplitude:
 
     def climbed(self, amplitudes: Array, begin: Sequence[Array]) -> Profile:
         """The profile at amplitudes (a,): blocks climb from k starts an amplitude, (a k, d); the best end stays."""
-        ends, rows = [], np.arange(len(amplitudes))
+        ends = []
+        rows = np.arange(len(amplitudes))
         for block, start in zip(self.pinned, begin, strict=True):
             k = len(start) // len(amplitudes)
             found = block.climb(start, np.repeat(amplitudes, k))

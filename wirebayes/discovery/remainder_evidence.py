@@ -109,7 +109,8 @@ def _noise_columns(target: LogPosterior) -> list[int]:
 
 def _log_units(target: LogPosterior, z: Array) -> float:
     """Logarithm of the volume of all readings' errors, in which an expansion measures residuals."""
-    problem, theta = target.problem, target.coordinates.to_natural(z)
+    problem = target.problem
+    theta = target.coordinates.to_natural(z)
     total = 0.0
     for sample in problem.samples:
         variance = sample.variance(problem.parameters(theta, sample))
@@ -214,7 +215,8 @@ class _Remainder:
         parameters = whitened(x, x.parameters[0], self.ratio)
         residual = whitened(x, x.residual[0][:, None], self.ratio)
         left = self._left(np.concatenate([parameters, residual], axis=1))
-        parameters_left, residual_left = left[:, :-1], left[:, -1]
+        parameters_left = left[:, :-1]
+        residual_left = left[:, -1]
         curvature = parameters.T @ parameters_left + x.prior_precision[0]
         slope = parameters.T @ residual_left + x.prior_gradient[0]
         along = solve(curvature[None], slope[None, :, None])[0, :, 0]

@@ -74,7 +74,9 @@ class Pieces:
 
     def log_bayes(self, added: float) -> Array:
         """(n,) of the only probe, had its amplitude `added` been in the data besides."""
-        along, square, is_left = self.along[..., 0], self.square[..., 0], self.is_left[..., 0]
+        along = self.along[..., 0]
+        square = self.square[..., 0]
+        is_left = self.is_left[..., 0]
         rss = self.rss + 2.0 * added * along + added**2 * square
         along = along + added * square
         if self.one_sided[0]:

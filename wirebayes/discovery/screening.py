@@ -15,7 +15,7 @@ from wirebayes.discovery.linear_scan import expand, plain_reference, scan
 from wirebayes.discovery.probes import Probe, forms, probes
 from wirebayes.discovery.refit import occam
 from wirebayes.discovery.scans import Scan, joined
-from wirebayes.discovery.settings import ABOVE_COUNT, ONE_NAT, UPPER
+from wirebayes.discovery.surprise import AGAINST, Scale
 from wirebayes.effects.elastic import LengthDependence
 from wirebayes.inference.climb import climb
 from wirebayes.inference.laplace_fit import LaplaceFit
@@ -33,7 +33,6 @@ TWO = "two effects together"
 FILE_WIDE = ("instrument", "environment")  # scopes of which all blocks share an amplitude
 # What a learned exponent of B says already: the two together are one direction, and a climb along it never ends.
 _LEARNED_EXPONENT = LengthDependence("B").key
-_AGAINST = -2.0  # nats; names that hardly show have nearly the same value in all simulations, below this
 
 
 @dataclass(frozen=True)
@@ -279,69 +278,15 @@ def joined_replicates(parts: Sequence[Replicates]) -> Replicates:
 def by_name(candidates: Sequence[Candidate], scans: Sequence[Scan]) -> dict[str, Array]:
     """(n,) the largest log Bayes factor of each name, of two effects together, and of the flexible reference.
 
-    None is below `_AGAINST`: clear evidence against a name is no surprise, however rare its size.
+    None is below `AGAINST`: clear evidence against a name is no surprise, however rare its size.
     """
     flexible = _alone_and_together([s.flexible for s in scans])
     two = _alone_and_together([s.two for s in scans])
-    out = {_FLEXIBLE: np.maximum(flexible, _AGAINST), TWO: np.maximum(two, _AGAINST)}
+    out = {_FLEXIBLE: np.maximum(flexible, AGAINST), TWO: np.maximum(two, AGAINST)}
     for c in candidates:
-        before = out.get(c.name, _AGAINST)
+        before = out.get(c.name, AGAINST)
         out[c.name] = np.maximum(before, scanned(c, scans).log_bayes)
     return out
-
-
-def empirical_surprise(value: Any, chance: Array) -> Any:
-    """Minus the log share of simulated values (n,) as large; beyond the largest it goes on by the distance."""
-    larger = len(chance) - np.searchsorted(np.sort(chance), value)
-    return np.log1p(len(chance)) - np.log1p(larger) + np.maximum(value - chance.max(), 0.0)
-
-
-@dataclass(frozen=True)
-class Scale:
-    """How surprising a log Bayes factor of one name is: minus the log share of simulations as large.
-
-    It is exceeded by chance about exponentially seldom. Counting the few simulations that exceed it would make the
-    surprise, and with it p, as uncertain as a number of five; a line through the upper values is not. Where a tail is
-    longer than exponential the line would lead far beyond what was counted: there the count decides.
-
-    Attributes
-    ----------
-    high : float
-        What a share `UPPER` of simulated values exceed.
-    fall : float
-        Nats by which the value grows while that share falls to 1/e of it.
-    chance : (n,) array
-        The simulated values.
-    """
-
-    high: float
-    fall: float
-    chance: Array
-
-    @staticmethod
-    def of(chance: Array) -> "Scale":
-        """The scale of simulated values; where there are few, the fall is nearly one nat, as for many readings."""
-        high = float(np.quantile(chance, 1.0 - UPPER))
-        beyond = chance[chance > high] - high
-        fall = (beyond.sum() + ONE_NAT) / (len(beyond) + ONE_NAT)
-        return Scale(high, float(fall), chance)
-
-    def surprise(self, value: Any) -> Any:
-        """How surprising a value is, or each value of an array; not at all where the evidence is against the name."""
-        along = np.maximum((value - self.high) / self.fall - np.log(UPPER), 0.0)
-        most = empirical_surprise(value, self.chance) + ABOVE_COUNT
-        return np.where(np.greater(value, _AGAINST), np.minimum(along, most), 0.0)
-
-    def value(self, surprise: float) -> float:
-        """The least value that is so surprising."""
-        along = self.high + self.fall * float(surprise + np.log(UPPER))
-        beyond = surprise - ABOVE_COUNT - float(np.log1p(len(self.chance)))  # the largest simulated value
-        if beyond > 0:
-            least = self.chance.max() + beyond
-        else:
-            share = min(1.0, np.exp(ABOVE_COUNT - surprise))
-            least = np.quantile(self.chance, 1.0 - share)
-        return max(along, float(least))
 
 
 @dataclass(frozen=True)

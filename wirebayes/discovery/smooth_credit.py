@@ -26,17 +26,14 @@ def beside_smooth(x: Expansion) -> Array:
     if not seen.any():
         return nothing
     products = _with_remainder(found, seen)
-    shared = products.shared
     least = float(x.least[0])
     half = 0.5 * x.degrees
     left = np.maximum(products.rss, least)
-    left_beside = left[..., None] - _gain(x, products)
-    left_beside = np.maximum(left_beside, least)
-    without = shared - half * np.log(left)
-    beside = shared[..., None] - half * np.log(left_beside)
+    left_beside = np.maximum(left[..., None] - _gain(x, products), least)
+    without = products.shared - half * np.log(left)
+    beside = products.shared[..., None] - half * np.log(left_beside)
     by_signature = beside.reshape(-1, signatures)
-    log_ratio = log_sum(by_signature) - log_sum(without.ravel())
-    return log_ratio
+    return log_sum(by_signature) - log_sum(without.ravel())
 
 
 class _Products(NamedTuple):
@@ -74,13 +71,14 @@ def _with_remainder(found: Projected, seen: Bools) -> _Products:
     excess = variance * values[:, None]
     taken = variance / (1.0 + excess)
     volume = np.log1p(excess).sum(axis=2)
-    shared = found.shared[0][seen][:, None]
-    rss = found.rss[0][seen][:, None]
-    along = found.along[0][seen][:, None]
-    square = found.divisor[0][seen][:, None]
+
+    def without(values: Array) -> Array:
+        """Of the first row at these ratios, for every size."""
+        return values[0][seen][:, None]
+
     return _Products(
-        shared - 0.5 * volume,
-        rss - (taken * of_residual**2).sum(axis=2),
-        along - (taken * of_residual) @ of_signatures,
-        square - taken @ of_signatures**2,
+        without(found.shared) - 0.5 * volume,
+        without(found.rss) - (taken * of_residual**2).sum(axis=2),
+        without(found.along) - (taken * of_residual) @ of_signatures,
+        without(found.divisor) - taken @ of_signatures**2,
     )

@@ -99,9 +99,8 @@ def decide(
     if _has_few_holds(plain):
         return Decision(found, best, retest)
     names = best.effects.names
-    by_family = {}
-    for family in dict.fromkeys(found.family(name) for name in names):
-        by_family[family] = family_gain(best, family, found, fits, left_out)
+    of_names = dict.fromkeys(found.family(name) for name in names)
+    by_family = {family: family_gain(best, family, found, fits, left_out) for family in of_names}
     first_gain = name_gain(best, names[0], fits, left_out)
     return Decision(found, best, retest, by_family, first_gain)
 

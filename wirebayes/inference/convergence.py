@@ -14,7 +14,8 @@ def autocorrelation_steps(values: Array) -> Array:
     off, so a weak memory that lasts is counted in full, walkers stuck apart lengthen the time, and the error is
     sqrt(2 / walkers), however long they walked. Walkers must be many, and know little of one another.
     """
-    steps, d = values.shape[1], values.shape[-1]
+    steps = values.shape[1]
+    d = values.shape[-1]
     means = values.mean(axis=1).reshape(-1, d)
     variance = values.reshape(-1, d).var(axis=0)
     moving = variance > 0
@@ -44,7 +45,8 @@ def farthest_apart(first: Array, second: Array) -> float:
     first, second : (ensembles, steps, walkers, d) arrays
         Of any numbers of steps.
     """
-    steps, worst = first.shape[1], 0.0
+    steps = first.shape[1]
+    worst = 0.0
     for each in _with_tails(np.concatenate([first, second], axis=1)):
         means = [part.mean(axis=1).reshape(-1, part.shape[-1]) for part in (each[:, :steps], each[:, steps:])]
         error = np.sqrt(sum(m.var(axis=0, ddof=1) / len(m) for m in means))

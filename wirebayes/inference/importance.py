@@ -170,7 +170,8 @@ def importance_sample(
     if len(draws):
         rough = WeightedPoints.equal(draws)
         current = _learned(rough, rough, start, order, rng, start)
-    n, past = _LEAST, None
+    n = _LEAST
+    past = None
     log_integral = log_ratio = np.zeros(1)  # broadcast to all densities by the first round
     settled = np.zeros(1, bool)
     for done in range(1, _ROUNDS + 1):

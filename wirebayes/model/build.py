@@ -168,8 +168,9 @@ def _instrument_priors(experiments: Sequence[Experiment], effects: Sequence[Effe
         for mark in marks:
             read = [e for e in experiments if mark in ("", f"[{e.control}]") and effect.acts_on(e.name, e.control)]
             own = effect.on([e.protocol() for e in read])
-            shared = [(column, a.prior) for column, a in _amplitudes([own]) if not a.of_each_test]
-            out |= {f"{column}{mark}": prior for column, prior in shared}
+            for column, amplitude in _amplitudes([own]):
+                if not amplitude.of_each_test:
+                    out[f"{column}{mark}"] = amplitude.prior
     return out
 
 
@@ -180,16 +181,18 @@ def _sample_priors(
     zero_mm = scales.zeros_mm.get(experiment.name, 0.0)
     defaults = wire_defaults(experiment.length_mm, scales, experiment.control, zero_mm)
     wanted = SAMPLE if spec.likelihood == "chain" else ("sensor_sd",)
-    own = [effect for effect in effects if effect.acts_on(experiment.name, experiment.control)]
     out: dict[str, Any] = {f"{name}{mark}": defaults[name] for name in wanted}
-    return out | {f"{c}{mark}": a.prior for c, a in _amplitudes(own) if a.of_each_test}
+    for column, amplitude in _amplitudes(_acting_on(experiment, effects)):
+        if amplitude.of_each_test:
+            out[f"{column}{mark}"] = amplitude.prior
+    return out
 
 
 def _in_natural_units(
     distributions: Mapping[str, Any], effects: Sequence[Effect], samples: Sequence[Sample], scales: Scales
 ) -> dict[str, Any]:
     """The priors in mm, N and s, of which defaults are in the test's own scales unless an effect says otherwise."""
-    natural = {c for c, a in _amplitudes(effects) if a.in_natural_units}
+    natural = {column for column, amplitude in _amplitudes(effects) if amplitude.in_natural_units}
     out = {}
     for name, prior in distributions.items():
         is_in_them = name in natural or isinstance(prior, int | float)
@@ -202,9 +205,15 @@ def _positive(free: Mapping[str, Any], effects: Sequence[Effect]) -> frozenset[s
 
     A log-uniform prior ends on both sides, where climbs by the logarithm would run into a wall.
     """
-    positive = _POSITIVE | {c for c, a in _amplitudes(effects) if a.is_shape}
-    by_nature = {n: ours(d) for n, d in free.items() if parameter_of(n) in positive}
-    return frozenset(n for n, d in by_nature.items() if d.support()[0] >= 0 and not isinstance(d, LogUniform))
+    positive = _POSITIVE | {column for column, amplitude in _amplitudes(effects) if amplitude.is_shape}
+    out = set()
+    for name, distribution in free.items():
+        if parameter_of(name) in positive:
+            prior = ours(distribution)
+            least, _ = prior.support()
+            if least >= 0 and not isinstance(prior, LogUniform):
+                out.add(name)
+    return frozenset(out)
 
 
 def _amplitudes(effects: Sequence[Effect]) -> list[tuple[str, Amplitude]]:
@@ -220,12 +229,16 @@ def _samples(members: Sequence[Experiment], effects: Sequence[Effect], spec: Mod
     typical = Typical(scales.tension_N, scales.hold_s)
     out = []
     for e in members:
-        present = tuple(effect for effect in effects if effect.acts_on(e.name, e.control))
-        model = Model(spec.law, spec.history, present, tension, length, typical)
+        model = Model(spec.law, spec.history, tuple(_acting_on(e, effects)), tension, length, typical)
         finest = max(e.resolution, FINEST * _extent(e))
         readings = e.readings()[..., None]
         out.append(Sample(e.name, e.material, e.protocol(), readings, finest, model))
     return out
+
+
+def _acting_on(experiment: Experiment, effects: Sequence[Effect]) -> list[Effect]:
+    """The effects that act on an experiment."""
+    return [effect for effect in effects if effect.acts_on(experiment.name, experiment.control)]
 
 
 def _extent(experiment: Experiment) -> float:

@@ -85,7 +85,8 @@ def carried_unread(line: Linearised, j: int, m: Array, p: Array, noise: ReadingN
         Mean and variance of the creep carried into it.
     noise : ReadingNoise
     """
-    carry_c, carry_s = line.carry_by_creep[j], line.carry_by_setting[j]
+    carry_c = line.carry_by_creep[j]
+    carry_s = line.carry_by_setting[j]
     mean = carry_c * m
     var = carry_c * carry_c * p + carry_s * carry_s * noise.setting_var
     return mean, var

@@ -220,7 +220,8 @@ def seen(line: Linearised, filtered: Filtered, measured: Measured, shapes: Array
         beside = filtered.carried_mean, filtered.carried_var, shapes
         contiguous = (np.ascontiguousarray(part, float) for part in beside)
         return compiled.kernel.seen(*_flat(line), *_observed(line.reading.shape[2], measured), *contiguous)
-    n, k = line.reading.shape[2], shapes.shape[2]
+    n = line.reading.shape[2]
+    k = shapes.shape[2]
     gram = np.zeros((k, k, n))
     along = np.zeros((k, n))
     mean = np.zeros((k, n))  # of the carried creep, had the shapes been the readings

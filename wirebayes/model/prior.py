@@ -185,7 +185,8 @@ def wire_defaults(
     dict of name to Distribution
         ``B`` is the creep at the typical tension in steps, ``k2`` the hazard after a typical hold.
     """
-    lengths, steps = length_mm / scales.range_mm, scales.range_mm / scales.step_mm
+    lengths = length_mm / scales.range_mm
+    steps = scales.range_mm / scales.step_mm
     if control == "displacement":
         return dict(_wire_defaults(lengths, steps))
     preload = Normal(-zero_mm / scales.step_mm, steps)
@@ -258,7 +259,8 @@ def from_table(key: str, table: Any) -> Any:
         found = shown(form) if "distribution" in table else "no such key"
         raise InputError(f"{key}.distribution: found {found}, expected one of {', '.join(_FORMS)} (or fixed = VALUE)")
     wanted, build = _FORMS[form]
-    extra, missing = set(table) - {"distribution", *wanted}, set(wanted) - set(table)
+    extra = set(table) - {"distribution", *wanted}
+    missing = set(wanted) - set(table)
     if extra or missing:
         raise InputError(
             f"{key}: found {shown(', '.join(sorted(set(table) - {'distribution'})) or 'nothing')}, "
@@ -307,7 +309,8 @@ def possible(key: str, name: str, wanted: Any) -> Any:
         return wanted
     if np.isfinite(low):
         raise InputError(f"{key}.low: found {low:g}, expected 0 or more: {name} is never negative")
-    mean, sd = float(wanted.mean()), float(wanted.std())
+    mean = float(wanted.mean())
+    sd = float(wanted.std())
     if mean < 0:
         raise InputError(f"{key}.mean: found {mean:g}, expected 0 or more: {name} is never negative")
     return wanted if mean > _NEVER_BELOW * sd else TruncatedNormal(-mean / sd, mean, sd)

@@ -79,7 +79,8 @@ class Problem:
 
     def parameters(self, theta: Array, sample: Sample) -> dict[str, Array]:
         """The parameters of one sample, each (n,), from an (n, d) array of all columns."""
-        columns, n = np.ascontiguousarray(theta.T), len(theta)
+        columns = np.ascontiguousarray(theta.T)
+        n = len(theta)
 
         def find(place: int | float) -> Array:
             return columns[place] if isinstance(place, int) else np.full(n, place)
@@ -137,7 +138,8 @@ class Problem:
 
         See `wirebayes.model.likelihoods.standardised`; `readings` as for `hold_log_likelihood`.
         """
-        values, residuals = [], []
+        values = []
+        residuals = []
         with np.errstate(all="ignore"):
             for sample, y in self.observed(readings):
                 own = self.parameters(theta, sample)

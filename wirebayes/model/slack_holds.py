@@ -116,7 +116,8 @@ def _stretches(
     edges: Edges, j: int, m: Array, p: Array, noise: ReadingNoise, taut: HoldRead
 ) -> tuple[_Stretch, _Stretch]:
     """How far the wire is stretched before a hold is read, and by its readings where the wire is taut."""
-    by_setting, by_creep = edges.stretch_by_setting[j], edges.stretch_by_creep[j]
+    by_setting = edges.stretch_by_setting[j]
+    by_creep = edges.stretch_by_creep[j]
     q = noise.setting_var
     mean = edges.stretch[j] + by_creep * m
     before = _Stretch(mean, by_creep**2 * p + by_setting**2 * q)
@@ -162,7 +163,8 @@ def settled(line: Linearised, is_taut: Bools, measured: Measured) -> Linearised:
     measured : Measured
     """
     assert line.edges is not None
-    taut, slack = line.edges.taut, line.edges.slack
+    taut = line.edges.taut
+    slack = line.edges.slack
     near = line.edges.near & ~np.isnan(measured.first_readings.value)
 
     def chosen(usual: Array, if_taut: Array, if_slack: Array) -> Array:

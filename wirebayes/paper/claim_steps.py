@@ -76,7 +76,8 @@ def _quantiles(drift_mm: np.ndarray[Any, np.dtype[np.float64]]) -> dict[str, Any
 
 def _at_home(robot: Robot, wires: Wires) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Drift of new wires at the home pose, mm, a value a draw."""
-    home_m, rotation = robot.home_m, matrix(robot.home_rotation_rad)
+    home_m = robot.home_m
+    rotation = matrix(robot.home_rotation_rad)
     course = drift.from_command(robot, wires, home_m, rotation, np.array([claim.TIME_S]))
     away_m = course.position_m[:, 0] - home_m
     return np.asarray(1e3 * np.linalg.norm(away_m, axis=-1))

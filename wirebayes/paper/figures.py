@@ -107,10 +107,12 @@ def drifts(rows: Sequence[Mapping[str, Any]], limit_mm: float, title: str) -> Fi
     for row in rows:
         if row["specimen_spread"] <= 0:
             continue
-        shift, colour = 0.14, HOLD
+        shift = 0.14
+        colour = HOLD
         loaded_s = row["loaded_before_s"]
         if loaded_s > 0:
-            shift, colour = -0.14, CHAIN
+            shift = -0.14
+            colour = CHAIN
             hours.add(loaded_s / 3600.0)
         y = len(names) - names.index(row["experiment"]) + shift
         ends = [row["q05_drift_mm"], row["q95_drift_mm"]]

@@ -26,7 +26,8 @@ TWO_MINUTES_S = 120.0  # the paper's longest hold
 
 
 def _measured(rows: Rows) -> Points:
-    samples, losses = [], []
+    samples = []
+    losses = []
     readings = 0
     for row in rows:
         length_m = row["length_mm"] / 1000
@@ -91,7 +92,8 @@ def _open(tables: dict[str, Rows]) -> Points:
 
 def _not_determined(rows: Rows) -> list[str]:
     """The parameters that the readings leave open, hold by hold and as one history."""
-    alone, chain = [], []
+    alone = []
+    chain = []
     for row in rows:
         name = row["parameter"]
         if row["verdict"] != "not determined" or "*" in name:

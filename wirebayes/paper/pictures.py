@@ -84,7 +84,8 @@ class Gallery:
         """
         hold = experiment.recorded_holds[-1]
         times = np.linspace(0.0, hold.duration_s, 49)
-        drawn, curve = last_hold_course(first, experiment, times, rng), published_course(published, experiment, times)
+        drawn = last_hold_course(first, experiment, times, rng)
+        curve = published_course(published, experiment, times)
         title = f"{experiment.name}: last hold, {hold.displacement_mm:g} mm"
         figure = paper_figures.last_hold(times, drawn, curve, (hold.time_s, hold.tension_N), title)
         missed = np.interp(hold.time_s[1:], times, curve) - hold.tension_N[1:]
@@ -104,7 +105,8 @@ class Gallery:
         for likelihood, out in seen.items():
             spoken = figures.WORDS[likelihood]
             curve = _published_at(experiment, published, out) if likelihood == "hold" else None
-            title, colour = f"{experiment.name}, {spoken}", figures.COLOURS[likelihood]
+            title = f"{experiment.name}, {spoken}"
+            colour = figures.COLOURS[likelihood]
             figure = figures.residual_figure(out.hold, out.time_s, out.measured_N, out.band_N, title, colour, curve)
             alt = f"Measured minus predicted tension in the unused holds of {experiment.name}, {spoken}."
             caption = f"rms {number(out.rms_N, 2)} N; {100 * out.coverage:.0f} % of the readings lie in the 90 % band."
@@ -167,7 +169,8 @@ class Gallery:
     def prior(self, experiment: Experiment, rng: Generator) -> None:
         """What the prior expects of this test."""
         problem = build([experiment])
-        sample, theta = problem.samples[0], problem.prior.rvs(4000, rng)
+        sample = problem.samples[0]
+        theta = problem.prior.rvs(4000, rng)
         drawn = replicate(problem, theta, sample, rng)
         figure = paper_figures.prior_predictive(sample.protocol, drawn, experiment.tension(), experiment.name)
         alt = f"First tensions and first hold of {experiment.name}: what the prior expects, and the readings."
@@ -192,7 +195,8 @@ def _near_the_stiffest_step(experiment: Experiment, stiffness: float) -> str:
 
 def _published_fraction(published: Mapping[str, float], time_s: float) -> float:
     """The share of the final creep that shows after a time, by the paper's numbers."""
-    rate, shape = np.asarray(published["k2"]), np.asarray(published["N"])
+    rate = np.asarray(published["k2"])
+    shape = np.asarray(published["N"])
     return float(creep_fraction(np.asarray(time_s), rate, shape))
 
 

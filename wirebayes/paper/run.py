@@ -59,7 +59,8 @@ def reproduce(
     InputError
         The folder belongs to something else.
     """
-    experiments, published = paper.experiments(), paper.published()
+    experiments = paper.experiments()
+    published = paper.published()
     training = int(published["identification"]["training_holds"])
     with open_run(directory, paper_configuration(experiments, seed, policy)) as run:
         if run.state != "done":
@@ -172,7 +173,8 @@ def _draw_robot(drawn: pictures.Gallery, rows: list[Row], chains: Mapping[str, S
 
 def _stored(folder: Path, training: int) -> tuple[dict[str, Stored], dict[str, Stored]]:
     """An experiment's posteriors by likelihood: of all holds, and of the first ones."""
-    full, first = dict[str, Stored](), dict[str, Stored]()
+    full = dict[str, Stored]()
+    first = dict[str, Stored]()
     for likelihood in LIKELIHOODS:
         full[likelihood] = load_posterior(folder / likelihood)
         first[likelihood] = load_posterior(folder / f"{likelihood}-first-{training}")
@@ -256,7 +258,8 @@ def _forecast_row(name: str, likelihood: str, seen: Forecast) -> Row:
 
 def _sampling_row(directory: Path, name: str, likelihood: str, suffix: str) -> Row:
     summary = _summary(directory / name / f"{likelihood}{suffix}")
-    evaluations, kept = summary["likelihood_evaluations"], summary["kept_evaluations"]
+    evaluations = summary["likelihood_evaluations"]
+    kept = summary["kept_evaluations"]
     ess = summary["smallest_ess"]
     trained_on = suffix.removeprefix("-").replace("-", " ")
     return {

@@ -68,7 +68,8 @@ def verdict_rows(
     of_test, of_test_before = (_of_test(values, powers) for values in (draws, prior))
     out = []
     for name in (*MATERIAL, PRODUCT):
-        after, before = _quantity(name, draws), _quantity(name, prior)
+        after = _quantity(name, draws)
+        before = _quantity(name, prior)
         value = float(_quantity(name, published))
         low, middle, high = interval(after)
         prior_low, _, prior_high = interval(before)

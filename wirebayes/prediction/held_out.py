@@ -121,7 +121,8 @@ def held_out(fitted: Posterior, experiment: Experiment, rng: np.random.Generator
         raise ValueError(f"{experiment.name}: all {trained} holds were trained on")
     test = _HeldOutTest(fitted, sample, protocol, experiment.readings(), requested, trained)
     if problem.likelihood == "hold":
-        free, given = None, _from_first_readings(test, rng)
+        free = None
+        given = _from_first_readings(test, rng)
     else:
         free, given = _along_the_chain(test, rng)
     past = int(here.protocol.recorded.sum())
@@ -245,7 +246,8 @@ def pit_band(draws: Array, observed: Array, probability: float = 0.95) -> tuple[
     counts = np.stack([(pit <= level).sum(axis=0) for level in levels])
     own = (observed_pit[:, None] <= levels).sum(axis=0)
     extreme = _most_extreme(counts, own, rows)
-    of_draws, of_observed = extreme[:-1], extreme[-1]
+    of_draws = extreme[:-1]
+    of_observed = extreme[-1]
     half = np.quantile(of_draws, 1.0 - probability) / 2.0
     shares = [min(half, 0.5), max(1.0 - half, 0.5)]
     ends = np.quantile(counts / rows, shares, axis=1)
@@ -286,7 +288,8 @@ def _chain_scores(test: _HeldOutTest) -> tuple[Array, Array, float]:
 
 def _chain_densities(test: _HeldOutTest, theta: Array) -> tuple[Array, Array, Array]:
     """Log densities (holds, n) of whole holds and of their first readings, and (n,) of all together, at draws."""
-    protocol, here = test.protocol, test.here
+    protocol = test.protocol
+    here = test.here
     firsts = test.unseen.copy()
     firsts[:, 1:] = False
     trained_on = protocol.mask & ~test.requested[:, None]

@@ -173,7 +173,8 @@ def _smoothed(conditional: Sequence[Floats]) -> tuple[Floats, Floats]:
 
 def _holds_named(problem: Problem, where: Sequence[tuple[int, int]]) -> tuple[tuple[str, ...], Ints]:
     """Sample and number of each hold."""
-    names, numbers = [], []
+    names = []
+    numbers = []
     for s, position in where:
         sample = problem.samples[s]
         names.append(sample.name)

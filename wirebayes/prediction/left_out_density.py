@@ -54,7 +54,8 @@ def log_densities(problem: Problem, holds: Holds, draws: Array, seed: int, doubt
     _bear_witness(target, holds, pool, settled, doubtful, rng)
     missing = ~settled & (whole_settled | doubtful)
     if missing.any():
-        log_whole, known = float(pool.log_integral[0]), whole_settled
+        log_whole = float(pool.log_integral[0])
+        known = whole_settled
         if not whole_settled:
             log_whole, known = _evidence(own, seed_of(seed, "whole"))
         for m in np.flatnonzero(missing).tolist():

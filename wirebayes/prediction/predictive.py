@@ -126,7 +126,9 @@ def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: Ge
     (H, R, n) array
         Readings of all holds of the protocol.
     """
-    protocol, trained, requested = request.protocol, request.trained, request.requested
+    protocol = request.protocol
+    trained = request.trained
+    requested = request.requested
     n = len(own["B"])
     error = rng.normal(size=(len(requested), n)) * own["setting_sd"]
     error_again = error.copy()

@@ -86,7 +86,9 @@ def _of_tested_sample(file: "_File", stored: Stored) -> ProtocolRequest:
     trained = stored.sample.protocol
     row_of = {int(number): row for row, number in enumerate(trained.number) if number >= 0}
     file.check_repeats(trained, row_of)
-    rows, later, repeated = [], [], []
+    rows = []
+    later = []
+    repeated = []
     for hold in file.holds:
         number = int(hold.number or 0)
         is_known = number in row_of

@@ -164,12 +164,13 @@ def beyond_tested(rows: Sequence[Sequence[Any]], stored: Stored) -> list[Notice]
 
 def _drawn(members: Members, seed: int, draws: int) -> dict[int, Floats]:
     """The readings (R, n) of each requested hold by all models, each with as many draws as it is probable there."""
-    experiment = members[0][1].stored.sample.name
-    rng = np.random.default_rng(seed_of(seed, "predict", experiment))
-    asked = members[0][1].prediction
+    _, first = members[0]
+    asked = first.prediction
+    rng = np.random.default_rng(seed_of(seed, "predict", first.stored.sample.name))
     # given readings may make any of them the only one that is left
     each = draws if np.isfinite(asked.first[asked.requested]).any() else 0
-    readings, log_weights = [], []
+    readings = []
+    log_weights = []
     for probability, request in members:
         stored = request.stored
         own_draws = max(each, ceil(probability * draws), _LEAST)
@@ -196,7 +197,8 @@ def _shares(log_weight: Floats) -> Floats:
 def _mixed(readings: Sequence[Floats], share: Floats, draws: int) -> Floats:
     """Draws (R, n) of several models, each as often as its share says, as many as each of them has enough for."""
     with np.errstate(divide="ignore"):
-        enough = min(draws, *(own.shape[1] / part for own, part in zip(readings, share, strict=True)))
+        enough_for = [own.shape[1] / part for own, part in zip(readings, share, strict=True)]
+    enough = min(draws, *enough_for)
     parts = []
     for own, part in zip(readings, share, strict=True):
         count = round(part * enough)

@@ -248,16 +248,10 @@ def residual_figure(
     upward = f"measured − predicted, {unit}"
     figure, axes = panel(across, upward, title)
     numbers, place = places_in_holds(hold, time_s)
-    is_last = np.diff(hold) != 0
-    ends = np.flatnonzero(is_last) + 1
-    low, middle, high = np.insert(band, ends, np.nan, axis=1)  # a gap between holds
-    band_place = np.insert(place, ends, np.nan)
-    lower, upper = low - middle, high - middle
-    axes.fill_between(band_place, lower, upper, color=colour, alpha=0.22, lw=0, label="90 % band")
+    _draw_band(axes, hold, place, band, colour)
     axes.axhline(0, color=colour, lw=1)
     median = band[1]
-    left = measured - median
-    axes.scatter(place, left, s=14, color=colour, zorder=3, label="measured − posterior median")
+    axes.scatter(place, measured - median, s=14, color=colour, zorder=3, label="measured − posterior median")
     columns = 3
     if paper_N is not None:
         columns = 2
@@ -267,6 +261,15 @@ def residual_figure(
     axes.set_xticks(range(len(names)), names)
     legend_below(figure, axes, columns)
     return figure
+
+
+def _draw_band(axes: Any, hold: Array, place: Array, band: Array, colour: str) -> None:
+    """The 90 % band about its middle, with a gap between holds."""
+    is_last = np.diff(hold) != 0
+    ends = np.flatnonzero(is_last) + 1
+    low, middle, high = np.insert(band, ends, np.nan, axis=1)
+    band_place = np.insert(place, ends, np.nan)
+    axes.fill_between(band_place, low - middle, high - middle, color=colour, alpha=0.22, lw=0, label="90 % band")
 
 
 def creep_ahead(ahead: ExtrapolatedCreep, title: str) -> Figure:
@@ -280,7 +283,8 @@ def creep_ahead(ahead: ExtrapolatedCreep, title: str) -> Figure:
     title = f"{title}, {ahead['tension_N']:g} N"
     figure, axes = panel("time under constant tension, s", "creep, mm", title)
     times = ahead["time_s"]
-    posterior, weaker = ahead["posterior_mm"], ahead["weaker_prior_mm"]
+    posterior = ahead["posterior_mm"]
+    weaker = ahead["weaker_prior_mm"]
     _fill(axes, times, ahead["prior_mm"], QUIET, "prior alone")
     _fill(axes, times, posterior, CHAIN, "posterior, 90 %")
     axes.plot(times, posterior["q50"], color=CHAIN, lw=1.2)

@@ -73,7 +73,8 @@ def _replicated_and_measured(
     problem: Problem, theta: Array, members: Sequence[Sample], rng: Generator
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """(n, H, R) readings of each sample at draws (n, d), and (1, H, R) what was read."""
-    replicated, measured = {}, {}
+    replicated = {}
+    measured = {}
     for member in members:
         predicted = replicate(problem, theta, member, rng)
         replicated[member.name] = np.moveaxis(predicted, -1, 0)
@@ -127,7 +128,8 @@ def _log_likelihood(fit: Fit, members: Sequence[Sample]) -> dict[str, Variable]:
 
 def _label(groups: Mapping[str, Group], members: Sequence[Sample]) -> None:
     """Units of all variables."""
-    effects, controls = all_effects(members), _controls(members)
+    effects = all_effects(members)
+    controls = _controls(members)
     for kind, group in groups.items():
         for name in group.variables:
             if kind in ("posterior", "prior"):

@@ -34,9 +34,11 @@ def contraction(posterior: Array, prior: Array) -> float:
     ----------
     M. Betancourt, Towards a principled Bayesian workflow (2020).
     """
-    after, before = np.asarray(posterior, float), np.asarray(prior, float)
+    after = np.asarray(posterior, float)
+    before = np.asarray(prior, float)
     if min(after.min(), before.min()) > 0:
-        after, before = np.log(after), np.log(before)
+        after = np.log(after)
+        before = np.log(before)
     return float(1.0 - after.var(ddof=1) / before.var(ddof=1))
 
 

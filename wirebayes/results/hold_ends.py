@@ -64,10 +64,14 @@ def cost(problem: Problem, best: Array, spread: Array) -> HoldEnds | None:
         for i, is_recorded in enumerate(recorded):
             if not is_recorded:
                 samples[i] = _longer(samples[i])
-        covered, supposed, advice = COVERED, _LONGER, _RECORD
+        covered = COVERED
+        supposed = _LONGER
+        advice = _RECORD
     elif any(unread_after_s(sample.protocol).any() for sample in samples):
         samples = [_shorter(sample) for sample in samples]
-        covered, supposed, advice = 1.0, _rests(problem.samples), _LET_GO
+        covered = 1.0
+        supposed = _rests(problem.samples)
+        advice = _LET_GO
     else:
         return None
     otherwise = replace(problem, samples=tuple(samples))

@@ -128,7 +128,8 @@ def parameter_in_words(name: str, figures: IdentifiabilityFigures, unit: str) ->
         verdict = f"data and prior both determine it (sensitivity to the prior {sensitivity:.2f})"
     else:
         verdict = "the data determine it"
-    after, before = number(figures["posterior_range_90"]), number(figures["prior_range_90"])
+    after = number(figures["posterior_range_90"])
+    before = number(figures["prior_range_90"])
     wide = f"spans a factor of {after}"
     if not figures["range_is_factor"]:
         shown = f" {unit_text(unit)}".rstrip()

@@ -74,7 +74,8 @@ def content(groups: Mapping[str, Group], attributes: Mapping[str, Any]) -> bytes
     attributes : mapping
         Of the file as a whole.
     """
-    stream, numbers = io.BytesIO(), count()
+    stream = io.BytesIO()
+    numbers = count()
     with h5py.File(stream, "w", track_order=True) as file:
         _describe(file, attributes)
         for name, group in groups.items():
@@ -138,7 +139,8 @@ def _make_scales(node: Any, written: Mapping[str, Any], sizes: Mapping[str, int]
     """Make a scale of the coordinate that labels a dimension, or an empty one."""
     for dim, size in sizes.items():
         if dim in written:
-            scale, name = written[dim], dim
+            scale = written[dim]
+            name = dim
         else:
             scale = node.create_dataset(dim, (size,), ">f4", track_order=True)
             name = f"{_NO_VARIABLE}{size:10}"

@@ -57,7 +57,8 @@ def by_length(own: dict[str, Array], model: Model, length_mm: float, reference_m
     length_mm, reference_mm : float
         Of the sample, and of those that it was fitted with.
     """
-    reference_N, typical = model.tension_ref_N, model.typical
+    reference_N = model.tension_ref_N
+    typical = model.typical
     hold = steady_hold(own, length_mm, reference_N, law=model.law, length_ref_mm=reference_mm, typical=typical)
     out: Any = own
     for effect in (e for e in model.effects if e.compares_lengths):

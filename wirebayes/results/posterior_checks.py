@@ -54,16 +54,21 @@ def posterior_warnings(fit: Fit, sample: Sample) -> list[Notice]:
     own = problem.parameters(fit.flat, sample)
     drawn = problem.prior.rvs(4000, np.random.default_rng(0))
     prior = problem.parameters(drawn, sample)
-    protocol, readings = sample.protocol, sample.readings[..., 0]
-    of_readings = data_checks.warnings(protocol, readings, sample.resolution)
-    if problem.likelihood == "chain":
-        preload_mm = problem.prior.fixed.get(problem.column("preload", sample))
-        of_preload = slack_by_preload(protocol, readings, sample.resolution, preload_mm)
-        of_readings = [*of_preload, *of_readings]
-        stated = {name for name in ("k1", "preload") if problem.column(name, sample) in problem.stated}
-        of_readings += data_checks.one_setting(protocol, stated)
     of_prior = leaning(problem.prior, fit.flat, _columns_of(problem, sample))
-    return [*of_readings, *of_posterior(own, prior, sample), *of_prior]
+    return [*_of_readings(problem, sample), *of_posterior(own, prior, sample), *of_prior]
+
+
+def _of_readings(problem: Problem, sample: Sample) -> list[Notice]:
+    """What is suspicious about the readings of one sample, given what is stated of its preload and stiffness."""
+    protocol = sample.protocol
+    readings = sample.readings[..., 0]
+    found = data_checks.warnings(protocol, readings, sample.resolution)
+    if problem.likelihood != "chain":
+        return found
+    preload_mm = problem.prior.fixed.get(problem.column("preload", sample))
+    of_preload = slack_by_preload(protocol, readings, sample.resolution, preload_mm)
+    stated = {name for name in ("k1", "preload") if problem.column(name, sample) in problem.stated}
+    return [*of_preload, *found, *data_checks.one_setting(protocol, stated)]
 
 
 def copied_samples(samples: Iterable[Sample]) -> dict[str, list[Notice]]:

@@ -53,7 +53,8 @@ def _check_draws(draws: Mapping[str, Array], sample: Sample, likelihood: str) ->
 
 def _check_shapes(sample: Sample) -> None:
     """Arrays of holds and of readings belong together."""
-    protocol, mask = sample.protocol, sample.protocol.mask
+    protocol = sample.protocol
+    mask = sample.protocol.mask
     holds = len(protocol.setting)
     for what, array in (("durations", protocol.duration_s), ("hold numbers", protocol.number)):
         if array.shape != (holds,):

@@ -78,7 +78,8 @@ def _hold_ends(fit: Fit) -> HoldEnds | None:
 
 def summary_of(fit: Fit, sample: Sample | None) -> SummaryJson:
     """What ``summary.json`` says of a fit: of one of its samples, or, where None, of all together."""
-    problem, chains = fit.problem, fit.chains
+    problem = fit.problem
+    chains = fit.chains
     first = sample or problem.samples[0]
     model = first.model
     tension = first.tested_tension_N

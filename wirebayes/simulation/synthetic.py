@@ -207,7 +207,9 @@ def draw(benches: Sequence[Bench], truth: Truth = Truth(), seed: int | np.random
     for name, value in truth.parameters.items():
         theta[0, _columns(problem, name, value)] = value
     problem = _referred(problem, theta)
-    settings, clean, readings = [], [], []
+    settings = []
+    clean = []
+    readings = []
     for sample in problem.samples:
         own = problem.parameters(theta, sample)
         setting, exact, read = _read(sample, own, rng)
@@ -350,7 +352,8 @@ def _gaps(experiment: Experiment) -> list[Entry]:
 
 def _truth(made: Simulated, i: int) -> TrueWire:
     sample = made.problem.samples[i]
-    model, protocol = sample.model, sample.protocol
+    model = sample.model
+    protocol = sample.protocol
     own = made.problem.parameters(made.theta, sample)
     parameters = {}
     for name, value in own.items():

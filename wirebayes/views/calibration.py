@@ -24,7 +24,8 @@ class Calibration(Result[CalibrateJson]):
         return of_calibration(self.summary())
 
     def next_step(self, given: Given = NOTHING) -> str:
-        robot, lengths = self.place.path / "robot.toml", self.place.path / "calibration.json"
+        robot = self.place.path / "robot.toml"
+        lengths = self.place.path / "calibration.json"
         if not self.summary()["usable"]:
             again = "with more poses, or once readings, stated errors and --anchor-sd are checked"
             return f"wirebayes calibrate {given.file} {again}"

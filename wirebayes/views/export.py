@@ -35,7 +35,8 @@ class Export(Result[ExportSummary]):
         return [f"{counted(len(self.files), 'file')}: {listed(list(self.files))}"]
 
     def next_step(self, given: Given = NOTHING) -> str:
-        folder, there = self.place.path, self.files
+        folder = self.place.path
+        there = self.files
         settings = {name: goal for name, goal in _FIRMWARE.items() if name in there}
         steps = [f"put the lines of {folder / name} into the printer's {goal}" for name, goal in settings.items()]
         if _MODEL in there:

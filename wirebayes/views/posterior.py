@@ -285,7 +285,8 @@ def _next_predictions(posterior: Posterior, own: str) -> list[str]:
     first, *others = posterior.experiments
     several = not posterior.alone or others
     whose = f" --experiment {first}" if several else ""
-    results, folder = posterior.place.path, posterior.folder
+    results = posterior.place.path
+    folder = posterior.folder
     commands = [next_prediction(results, folder, whose + own)]
     for name in others:
         file = next_hold_of(name)

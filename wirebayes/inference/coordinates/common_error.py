@@ -35,7 +35,8 @@ class CommonError:
 
     def errors(self, coordinates: Array, theta: Array) -> Array:
         """Errors of coordinates (m, n) beside natural parameters (n, d)."""
-        precision, apart = self._precision(theta), coordinates[1:]
+        precision = self._precision(theta)
+        apart = coordinates[1:]
         total = precision.sum(axis=0)
         first = (coordinates[0] * np.sqrt(total) - (precision[1:] * apart).sum(axis=0)) / total
         return np.concatenate([first[None], first + apart])

@@ -97,7 +97,9 @@ def _half_cauchy(scale: float, log_prior: Function) -> Edge:
 
 def _cut_off(known: TruncatedNormal) -> Edge:
     """Each half from its own tail."""
-    least, middle, sd = known.least_sd, known.centre, known.sd
+    least = known.least_sd
+    middle = known.centre
+    sd = known.sd
     below = ndtr(least)
     above = ndtr(-least)
     end = known.support()[0]

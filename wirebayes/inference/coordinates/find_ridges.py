@@ -149,7 +149,9 @@ def _times(sample: Sample, durations: Array) -> dict[str, Any]:
 
 def _holds(sample: Sample, tension: Array) -> tuple[HoldContext, ...]:
     """What effects see of the holds, which begin at these tensions (H,)."""
-    length, reference, typical = sample.length_ref_mm, sample.model.tension_ref_N, sample.model.typical
+    length = sample.length_ref_mm
+    reference = sample.model.tension_ref_N
+    typical = sample.model.typical
     contexts = []
     for hold, first in zip(sample.protocol.holds, tension, strict=True):
         begun = np.full((1, 1), first)

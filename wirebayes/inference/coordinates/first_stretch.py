@@ -143,7 +143,8 @@ class FirstStretch:
         strain_for_one = self._strain_for_one(theta)
         read = self.read[:, None]
         first = self.read[0]
-        lowest, highest = first / _MOST, first * _MOST
+        lowest = first / _MOST
+        highest = first * _MOST
         tension = np.full(len(theta), first)
         square = np.ones(len(theta))
         for _ in range(_REPETITIONS):

@@ -84,7 +84,8 @@ class LastReadings:
         ridge = self.ridge
         drive = np.exp(ridge.get(theta, "U") * ridge.log_tension[:, None])
         at_last, at_end = (ridge.reached(theta, time_s[:, None]) for time_s in (self.time_s, ridge.end_s))
-        carried, out = 0.0 * drive[0], []
+        carried = 0.0 * drive[0]
+        out = []
         for aim, last, end in zip(drive, at_last, at_end, strict=True):
             amount = aim - ridge.kept * carried
             out.append(carried + amount * last)
@@ -102,7 +103,8 @@ def last_readings(ridge: Ridge, problem: Problem, sample: Sample) -> LastReading
     problem : Problem
     sample : Sample
     """
-    protocol, holds = sample.protocol, np.arange(len(sample.readings))
+    protocol = sample.protocol
+    holds = np.arange(len(sample.readings))
     last = protocol.last_reading
     tension = protocol.setting if protocol.control == "force" else sample.readings[holds, last, 0]
     read = protocol.recorded & (tension > 0.0)

@@ -90,7 +90,9 @@ def slack_edge(problem: Problem, sample: Sample) -> SlackEdge | None:
         first hold is not clearly seen to be taut and to creep: then it may be slack, and the edge lies amid the
         posterior.
     """
-    prior, protocol, readings = problem.prior, sample.protocol, sample.readings[..., 0]
+    prior = problem.prior
+    protocol = sample.protocol
+    readings = sample.readings[..., 0]
     if protocol.control == "force" or problem.likelihood != "chain":
         return None
     preload = problem.place("preload", sample)

@@ -116,7 +116,8 @@ class SoftenedStiffness(Step):
     last: LastReadings | None = None
 
     def to_sampled(self, z: Array, theta: Array) -> None:
-        ridge, column = self.ridge, self.ridge.where["k1"]
+        ridge = self.ridge
+        column = self.ridge.where["k1"]
         if ridge.fixture is not None:
             own = np.log(theta[:, ridge.fixture]) + np.log(ridge.get(theta, "k1")) - ridge.log_length
             z[:, ridge.fixture] = shares.score(own, np.zeros_like(own))
@@ -124,7 +125,8 @@ class SoftenedStiffness(Step):
         z[:, column] -= self._softened(theta, z)
 
     def to_natural(self, theta: Array, z: Array) -> None:
-        ridge, column = self.ridge, self.ridge.where["k1"]
+        ridge = self.ridge
+        column = self.ridge.where["k1"]
         log_k1 = z[:, column] + self._softened(theta, z)
         if ridge.fixture is not None:
             share, rest = shares.log_shares(z[:, ridge.fixture])
@@ -202,12 +204,14 @@ class Level(Step):
     level: TensionLevel
 
     def to_sampled(self, z: Array, theta: Array) -> None:
-        k1, B = self.level.k1, self.ridge.where["B"]
+        k1 = self.level.k1
+        B = self.ridge.where["B"]
         z[:, k1] = self.level.log_tension(theta, z[:, k1]) - self._log_expected(theta, z[:, B])
         z[:, B] -= self.ridge.get(theta, "U") * z[:, k1]
 
     def to_natural(self, theta: Array, z: Array) -> None:
-        k1, B = self.level.k1, self.ridge.where["B"]
+        k1 = self.level.k1
+        B = self.ridge.where["B"]
         z[:, B] += self.ridge.get(theta, "U") * z[:, k1]
         tension = z[:, k1] + self._log_expected(theta, z[:, B])
         z[:, k1] = tension - self.level.log_tension(theta, np.zeros(len(theta)))  # for the steps before this one
@@ -232,14 +236,16 @@ class WeightLevel(Step):
         return [level.preload for level in self.levels]
 
     def to_sampled(self, z: Array, theta: Array) -> None:
-        B, U = self.ridge.where["B"], self.ridge.get(theta, "U")
+        B = self.ridge.where["B"]
+        U = self.ridge.get(theta, "U")
         log_B = self._log_B(theta, z[:, B])
         errors = np.array([level.score(theta, U, level.log_total(theta, log_B)) for level in self.levels])
         z[:, B] += self._log_gain(theta, errors)
         z[:, self.preloads] = (self.common.coordinates(errors, theta) if self.common else errors).T
 
     def to_natural(self, theta: Array, z: Array) -> None:
-        B, U = self.ridge.where["B"], self.ridge.get(theta, "U")
+        B = self.ridge.where["B"]
+        U = self.ridge.get(theta, "U")
         errors = self._errors(theta, z)
         z[:, B] -= self._log_gain(theta, errors)  # for the steps before this one
         log_B = self._log_B(theta, z[:, B])
@@ -247,7 +253,8 @@ class WeightLevel(Step):
             theta[:, level.preload] = level.value(error, theta, U, level.log_total(theta, log_B))
 
     def log_jacobian(self, theta: Array, z: Array) -> Array | float:
-        B, U = self.ridge.where["B"], self.ridge.get(theta, "U")
+        B = self.ridge.where["B"]
+        U = self.ridge.get(theta, "U")
         log_B = self._log_B(theta, z[:, B] - self._log_gain(theta, self._errors(theta, z)))
         slopes = [level.slope(theta, U, level.log_total(theta, log_B)) for level in self.levels]
         of_preloads = np.log(slopes).sum(axis=0) - np.log(self.scale[self.preloads]).sum()

@@ -186,7 +186,8 @@ class Transformation:
         theta, z : (n, d) arrays
             Natural parameters and their coordinates.
         """
-        prior, columns = self.problem.prior, self.columns
+        prior = self.problem.prior
+        columns = self.columns
         spread = columns.log_spread
         # other coordinates than logarithms have a standard deviation of one already
         out = z.copy()

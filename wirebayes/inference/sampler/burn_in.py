@@ -86,7 +86,8 @@ def init(
         found = searched.modes
         witness = searched.cold, searched.height
         if rough is None:
-            hot, cold = searched.warm, searched.cold
+            hot = searched.warm
+            cold = searched.cold
     known = overdispersed(found)
     random = np.random.RandomState(np.random.MT19937(of_walkers))
     count = _walking(target, policy)
@@ -327,9 +328,12 @@ def _fitted(
     points: int = POINTS,
 ) -> BurnIn:
     """Fit the proposal to points of the warm density and of the density, and to those of the round before."""
-    learned, before, state = state.learned, state.seen, replace(state, seen=(hot, cold))
+    learned = state.learned
+    before = state.seen
+    state = replace(state, seen=(hot, cold))
     if before is not None:
-        hot, cold = before[0].joined(hot), before[1].joined(cold)
+        hot = before[0].joined(hot)
+        cold = before[1].joined(cold)
     components = policy.components * (MORE_COMPONENTS if learned.again else 1)
     try:
         new = proposal.fit_proposal(

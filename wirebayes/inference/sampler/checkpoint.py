@@ -35,7 +35,8 @@ def write_checkpoint(path: Path, fit: Mapping[str, Any], values: Mapping[str, An
     arrays : mapping
         Of arrays, or of such mappings; None is left out.
     """
-    content, flat = BytesIO(), _flat(arrays)
+    content = BytesIO()
+    flat = _flat(arrays)
     state = {"format": FORMAT, "fit": plain(fit), "values": values, "arrays": sorted(flat)}
     with zipfile.ZipFile(content, "w") as archive:
         archive.writestr(_VALUES, json.dumps(state))

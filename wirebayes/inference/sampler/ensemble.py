@@ -113,7 +113,8 @@ def sample_posterior(
             state = kept.keep_block(target, state, policy)
         progress(_share(state, policy))
         resume.save_state(state, checkpoint, of_fit)
-    diagnostics, kept_draws = state.diagnostics, state.all_kept
+    diagnostics = state.diagnostics
+    kept_draws = state.all_kept
     assert diagnostics is not None
     return Chains(
         z=by_ensemble(kept_draws.z, policy),

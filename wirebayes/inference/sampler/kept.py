@@ -60,7 +60,8 @@ def block_steps(state: Sampling, policy: Policy) -> int:
 
     One block of a new proposal before the first look: it shows whether it is to be learned once more.
     """
-    kept, last = state.all_kept.steps, state.diagnostics
+    kept = state.all_kept.steps
+    last = state.diagnostics
     if last is None:
         return min(policy.block, policy.most_steps - kept)
     short = max(policy.ess / last.ess.min() - 1.0, ENOUGH * last.autocorrelation.max() / kept - 1.0)

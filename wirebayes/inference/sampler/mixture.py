@@ -82,11 +82,13 @@ class Mixture:
 
     def log_parts(self, distances: Array) -> Array:
         """(k, n) log of weight times density of each component."""
-        d, nu = self.centres.shape[1], np.reshape(self.degrees, (-1, 1))
+        d = self.centres.shape[1]
+        nu = np.reshape(self.degrees, (-1, 1))
         constant = gammaln(0.5 * (nu + d)) - gammaln(0.5 * nu) - 0.5 * d * np.log(nu * np.pi)
         own = np.log(self.weights) - np.log(np.einsum("kii->ki", self.factors)).sum(axis=1)
         kind = distances.dtype
-        heavy, nu = (-0.5 * (nu + d)).astype(kind), nu.astype(kind)
+        heavy = (-0.5 * (nu + d)).astype(kind)
+        nu = nu.astype(kind)
         return (constant + own[:, None]).astype(kind) + heavy * np.log1p(distances / nu)
 
 
@@ -231,8 +233,7 @@ def _em(
         heavy = share * (degrees + d) / (degrees + distances)
         centres, scatter = _moments(heavy, x, squares)
         scatter += of_the_whole * np.eye(d)
-        counted = members + of_the_whole
-        factors = np.linalg.cholesky(scatter / counted[:, None, None])
+        factors = np.linalg.cholesky(scatter / (members + of_the_whole)[:, None, None])
         mixture = Mixture(members / members.sum(), centres, factors, degrees)
         log_likelihood = float(weight @ total)
         if log_likelihood - last < EM_GAIN * members.sum():
@@ -243,7 +244,8 @@ def _em(
 
 def _moments(heavy: Array, x: Array, squares: Array) -> tuple[Array, Array]:
     """Centre of each component, and the sum of squares around it, of points that count so heavily in it."""
-    k, d = len(heavy), x.shape[1]
+    k = len(heavy)
+    d = x.shape[1]
     mass = heavy.sum(axis=1)
     centres = (heavy @ x) / mass[:, None]
     around_origin = (heavy @ squares).reshape(k, d, d)

@@ -48,7 +48,10 @@ class PoolMove(Move):  # type: ignore[misc]
     """
 
     def __init__(self, proposal: Mixture | Proposal, between: Move, steps: int, most: int) -> None:
-        self.proposal, self.between, self.steps, self.most = proposal, between, steps, most
+        self.proposal = proposal
+        self.between = between
+        self.steps = steps
+        self.most = most
         self.components = components(proposal)
         self.coming: list[tuple[Array, Array, Bools]] = []
 

@@ -66,7 +66,8 @@ def to_values(state: State) -> dict[str, Any]:
 
 def to_arrays(state: State) -> dict[str, Any]:
     """Arrays by name, those of parts under the part's name; absent ones are None."""
-    walkers, learned = state.walkers, state.learned
+    walkers = state.walkers
+    learned = state.learned
     out: dict[str, Any] = {
         "positions": walkers.positions,
         "values": walkers.values,

@@ -54,7 +54,8 @@ def apply(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
     long_enough = steps >= ENOUGH * found.autocorrelation.max()
     if long_enough and (found.ess >= policy.ess).all() and (found.r_hat <= policy.r_hat).all():
         if not learned.overlooked:
-            least, most = float(found.ess.min()), float(found.r_hat.max())
+            least = float(found.ess.min())
+            most = float(found.r_hat.max())
             why = f"after {steps} steps: smallest ESS {least:.0f}, largest nested R-hat {most:.4f}"
             return replace(state, finished=True, converged=True, why=why)
         if learned.again >= MOST_AGAIN:
@@ -99,7 +100,8 @@ def _contradicted(state: Sampling, policy: Policy, z: Array, values: Array) -> b
     A mode that had too few draws hardly shows in a mean: the share of places of which the proposal of that time made
     too little is looked at itself.
     """
-    before, previous = state.earlier.steps, state.learned.previous
+    before = state.earlier.steps
+    previous = state.learned.previous
     if farthest_apart(values[:, :before], values[:, before:]) > DISAGREE:
         return True
     if previous is None:
@@ -124,7 +126,8 @@ def worth_a_new_start(state: Sampling) -> bool:
     mode's share from it when they began.
     """
     assert state.diagnostics is not None
-    known, least = state.learned, state.diagnostics.ess.min()
+    known = state.learned
+    least = state.diagnostics.ess.min()
     lost = known.lost and known.again < MOST_AGAIN
     poor = known.again < FOR_MORE and least < POOR * state.all_kept.evaluations
     return bool(lost or poor)
@@ -136,7 +139,8 @@ def worth_refining(state: Sampling, policy: Policy) -> bool:
     For what it overlooks, or because with one as good as usual draws would be enough after fewer evaluations.
     """
     assert state.diagnostics is not None
-    known, least = state.learned, state.diagnostics.ess.min()
+    known = state.learned
+    least = state.diagnostics.ess.min()
     going_on = state.all_kept.evaluations * (policy.ess / least - 1.0)
     wanted = policy.ess - (0.0 if slow_at_first(state, policy) else least)
     needed = known.again < MOST_AGAIN and known.overlooked > 0.0

@@ -15,7 +15,8 @@ from wirebayes.numeric.typing import Array
 def made_symmetric(x: Array, shape: Array) -> tuple[Array, Array]:
     """What is even where x has this shape, sinh(arcsinh w - skewness), and the slopes; w is x in units of the shape."""
     location, width, skewness = shape
-    even, odd = np.cosh(skewness), np.sinh(skewness)
+    even = np.cosh(skewness)
+    odd = np.sinh(skewness)
     w = (x - location) / width
     root = np.sqrt(1.0 + w * w)
     return w * even - root * odd, (even - w / root * odd) / width

@@ -173,7 +173,8 @@ def fit_map(points: WeightedPoints, order: Ints, scores: Sequence[int] = ()) -> 
     numpy.linalg.LinAlgError
         If the points do not span their space.
     """
-    x, weight = points.z[:, order], points.weight
+    x = points.z[:, order]
+    weight = points.weight
     d = x.shape[1]
     worth = weight.sum()
     v, centre, scale = _standardised(x, weight)

@@ -82,9 +82,7 @@ def one_table(tables: Sequence[RawTable], each_file: str, mapping: Sequence[str]
         of_files = [(*cells, setting[0]) for cells, setting in zip(of_files, settings, strict=True)]
         told = listed([" ".join(setting) for setting in settings])
         notes.append(f"the {role} of each hold from {source}: {told}")
-    rows, pieces = _rows(tables, of_files)
-    sheet = replace(first.sheet, path=path_of_all([table.sheet.path for table in tables]))
-    return replace(first, sheet=sheet, header=header, units=units, rows=rows, pieces=pieces), notes
+    return replace(_together(tables, of_files), header=header, units=units), notes
 
 
 def _names(tables: Sequence[RawTable]) -> str:
@@ -98,9 +96,8 @@ def _in_order(tables: Sequence[RawTable], mapping: Sequence[str]) -> tuple[list[
     """
     tables = sorted(tables, key=lambda table: _as_people_count(table.sheet.path))
     with_dates = [dated(table) for table in tables]
-    rows, pieces = _rows(with_dates, [()] * len(tables))
-    sheet = replace(with_dates[0].sheet, path=path_of_all([table.sheet.path for table in tables]))
-    calendar = _calendar_s(replace(with_dates[0], sheet=sheet, rows=rows, pieces=pieces), mapping)
+    together = _together(with_dates, [()] * len(tables))
+    calendar = _calendar_s(together, mapping)
     if calendar is None:
         return tables, "names"
     lengths = [len(table.rows) for table in tables]
@@ -109,19 +106,19 @@ def _in_order(tables: Sequence[RawTable], mapping: Sequence[str]) -> tuple[list[
     return [tables[i] for i in in_order], "dates"
 
 
-def _rows(
-    tables: Sequence[RawTable], of_files: Sequence[tuple[str, ...]]
-) -> tuple[tuple[SheetRow, ...], tuple[tuple[int, str], ...]]:
-    """The rows of all files with more cells, those of their file, and the line after which each file begins."""
+def _together(tables: Sequence[RawTable], of_files: Sequence[tuple[str, ...]]) -> RawTable:
+    """The rows of all files in one table, each with more cells, those of its file."""
     rows: list[SheetRow] = []
-    pieces: list[tuple[int, str]] = []
+    pieces: list[tuple[int, str]] = []  # the line after which each file begins
     for table, of_file in zip(tables, of_files, strict=True):
         begin = rows[-1].line if rows else 0
         pieces.append((begin, table.sheet.path.name))
         for row in table.rows:
             cells = tuple(row.cell(i) for i in range(len(table.header)))
             rows.append(replace(row, line=begin + row.line, cells=(*cells, *of_file)))
-    return tuple(rows), tuple(pieces)
+    first = tables[0]
+    sheet = replace(first.sheet, path=path_of_all([table.sheet.path for table in tables]))
+    return replace(first, sheet=sheet, rows=tuple(rows), pieces=tuple(pieces))
 
 
 def path_of_all(paths: Sequence[Path]) -> Path:

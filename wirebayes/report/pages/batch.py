@@ -40,7 +40,8 @@ _SHOWN = ("k1", "B", "U", "k2", "N")
 def batch_page(folder: Path, configuration: Configuration) -> Page:
     """The content of ``batch.json``."""
     found: BatchJson = read_json(folder / "batch.json")
-    rows, far = found["experiments"], found["outliers"]
+    rows = found["experiments"]
+    far = found["outliers"]
     fitted = [row for row in rows if row["parameters"]]
     lead, *others = batch_in_sentences(found)
     summary = _summary(others, rows, fitted, far)

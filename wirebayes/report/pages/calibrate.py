@@ -37,7 +37,8 @@ from wirebayes.sentences import coordinates, counted, from_to
 def calibrate_page(folder: Path, configuration: Configuration) -> Page:
     """The content of ``calibration.json``."""
     found: CalibrateJson = read_json(folder / "calibration.json")
-    creep, hooke = found["with_creep_model"], found["by_hooke_alone"]
+    creep = found["with_creep_model"]
+    hooke = found["by_hooke_alone"]
     columns = Columns([_done(found), _known(found), _unknown(creep, hooke)])
     first: list[Block] = before_the_answer(found)
     first += _errors(found)
@@ -70,7 +71,8 @@ _FILES = (
 
 def _errors(found: CalibrateJson) -> list[Block]:
     """The picture of what was wrong before; none where the search did not converge."""
-    creep, hooke = found["with_creep_model"], found["by_hooke_alone"]
+    creep = found["with_creep_model"]
+    hooke = found["by_hooke_alone"]
     if not (creep["converged"] and hooke["converged"]):
         return []
     figure = reference_errors(creep, hooke, found["prior"]["reference_sd_mm"])

@@ -71,7 +71,8 @@ def check_page(folder: Path, configuration: Configuration) -> Page:
 def _import_page(folder: Path, files: Section) -> Page:
     """The content of ``import.json``."""
     content: ImportJson = read_json(folder / "import.json")
-    sections, understood = [], []
+    sections = []
+    understood = []
     for name, experiment in content["experiments"].items():
         picture = _picture(folder, name, " Is this the test that was done?")
         sections.append(Section(name, _imported(experiment, picture)))

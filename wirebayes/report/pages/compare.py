@@ -70,7 +70,8 @@ def compare_page(folder: Path, configuration: Configuration) -> Page:
 def _section(folder: Path, name: str, table: ComparedModels) -> Section:
     own = folder / name
     pictures = pictures_in(own, _CAPTIONS) if own.is_dir() else []
-    first, others = pictures[:_FIRST], pictures[_FIRST:]
+    first = pictures[:_FIRST]
+    others = pictures[_FIRST:]
     scored = []
     failed = []
     for row in table["models"]:

@@ -287,7 +287,8 @@ def _patterns(folder: Path, found: ExperimentFindings) -> list[Block]:
 def _held_out(found: ExperimentFindings) -> list[str]:
     """How much the error on held-out holds changes; nothing where it says nothing."""
     held = found.get("held_out") or {}
-    plain, final = held.get("plain"), held.get("final")
+    plain = held.get("plain")
+    final = held.get("final")
     if not plain or not final or found["verdict"] == "nothing-missing":
         return []
     if not held["holds"]:

@@ -255,9 +255,11 @@ def _measured(stored: Stored, summary: SummaryJson) -> Points:
     sample = stored.sample
     protocol = sample.protocol
     read = sample.readings[..., 0][protocol.mask]
-    pulled, tension = "Tensions", read
+    pulled = "Tensions"
+    tension = read
     if protocol.control == "force":
-        pulled, tension = "Weights", protocol.setting[protocol.recorded]
+        pulled = "Weights"
+        tension = protocol.setting[protocol.recorded]
     recorded = int(protocol.recorded.sum())
     unrecorded = len(protocol.recorded) - recorded
     holds = counted(recorded, "hold")
@@ -293,7 +295,8 @@ def _known(summary: SummaryJson, shrunk: dict[str, float], trusted: bool) -> lis
 
 
 def _parameters(draws: dict[str, Array], shrunk: dict[str, float], sample: Sample) -> Table:
-    effects, control = sample.model.effects, sample.protocol.control
+    effects = sample.model.effects
+    control = sample.protocol.control
     lines = []
     for name, values in draws.items():
         low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
@@ -340,7 +343,8 @@ def _derived(summary: SummaryJson) -> Table:
 
 
 def _residuals(stored: Stored) -> Figure:
-    sample, kind = stored.sample, stored.likelihood
+    sample = stored.sample
+    kind = stored.likelihood
     protocol = sample.protocol
     readings = sample.readings[..., 0]
     wanted = protocol.mask.copy()

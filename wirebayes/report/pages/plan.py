@@ -174,7 +174,8 @@ def _effects(row: JudgedProtocol) -> Table:
     """What sizes of effects would be seen."""
     lines = []
     for name, seen in row["effects"].items():
-        amplitude, delta = number(seen["amplitude_80"], 2), number(seen["delta_80"], 2)
+        amplitude = number(seen["amplitude_80"], 2)
+        delta = number(seen["delta_80"], 2)
         confused = ", ".join(map(_words, seen["confused_with"])) or NONE
         lines.append([_words(name), amplitude, unit_or_dash(seen["unit"]), delta, confused])
     header = ["effect", "amplitude", "unit", "δ", "hard to distinguish from"]

@@ -58,7 +58,8 @@ def pose_page(folder: Path, configuration: Configuration) -> Page:
     pose: PoseJson = content
     view = robot_view(folder)
     pictures = _pictures(folder, without_robot=bool(view))
-    first, rest = pictures[:_FIRST], pictures[_FIRST:]
+    first = pictures[:_FIRST]
+    rest = pictures[_FIRST:]
     blocks: list[Block] = before_the_answer(pose)
     if first:
         blocks.append(Pictures(first))
@@ -143,7 +144,8 @@ def _commanded(pose: PoseJson) -> list[str]:
     if not inverse:
         return []
     tensions = inverse["tension_N"]
-    low, high = number(min(tensions)), number(max(tensions))
+    low = number(min(tensions))
+    high = number(max(tensions))
     rule = pose["tension_distribution"]["choice"].replace("_", " ")
     points = [f"Tensions by the rule “{rule}”: {low} to {high} N."]
     angles = inverse.get("motor_angle_rad")
@@ -171,7 +173,8 @@ def _moved(pose: PoseJson) -> list[str]:
         if entry["distance_mm"]["q50"]:
             low, middle, high = at_row(entry["distance_mm"], -1)
             moved = quantity(middle, low, high, "mm")
-            time, alike = lasting(entry["times_s"][-1]), specimens_are(entry["specimen_spread"])
+            time = lasting(entry["times_s"][-1])
+            alike = specimens_are(entry["specimen_spread"])
             known.append(f"After {time} the platform has moved by {moved}, if {alike}.")
     return known
 
@@ -185,7 +188,8 @@ def _within_limits(pose: PoseJson) -> list[str]:
     time = lasting(claim["time_s"])
     limits = f"less than {claim['distance_mm']:g} mm and tilts less than {claim['tilt_deg']:g}°"
     for held in claim["holds"]:
-        chance, alike = percent(held["probability"]), specimens_are(held["specimen_spread"])
+        chance = percent(held["probability"])
+        alike = specimens_are(held["specimen_spread"])
         known.append(f"It moves {limits} within {time} with a probability of {chance}, if {alike}.")
     space = pose.get("workspace")
     if space:
@@ -275,7 +279,8 @@ def _errors(pose: PoseJson) -> list[Block]:
     lines = []
     for entry in entries:
         who = [CONTROLLERS[entry["controller"]], _spread(entry["specimen_spread"])]
-        times, distance = entry["times_s"], entry["distance_mm"]
+        times = entry["times_s"]
+        distance = entry["distance_mm"]
         for i, time in enumerate(times):
             if distance["q50"] and time in (60, 600, times[-1]):
                 low, middle, high = at_row(distance, i)

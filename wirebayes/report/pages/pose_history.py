@@ -102,7 +102,8 @@ def _pictures(folder: Path) -> dict[str, Picture]:
 
 
 def _requested(pose: PoseHistoryJson) -> list[str]:
-    history, wires = pose["history"], pose["wires"]
+    history = pose["history"]
+    wires = pose["wires"]
     kind = "measured joint values" if history["kind"] == "measured" else "commanded poses"
     duration = number(float(history["duration_s"]))
     rows = counted(history["rows"], "row")
@@ -181,7 +182,8 @@ def _from_where(history: HistoryOfRobot) -> str:
 
 
 def _unknown(pose: PoseHistoryJson) -> list[str]:
-    clock, history = pose["clock"], pose["history"]
+    clock = pose["clock"]
+    history = pose["history"]
     unknown = [
         "A test cannot show when a moving wire's clock restarts. If it started once and ran on, the pose would "
         f"differ by {_mm(clock['largest_mm'])} mm at most, {_mm(clock['at_the_end_mm'])} mm at the end."

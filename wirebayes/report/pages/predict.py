@@ -58,7 +58,8 @@ def predict_page(predicted: Prediction, table: Path) -> Page:
     """
     about = predicted.attrs
     name = about["experiment"]
-    kinds, texts = about.get("warning_kinds", ()), about.get("warnings", ())
+    kinds = about.get("warning_kinds", ())
+    texts = about.get("warnings", ())
     notices: list[NoticeJson] = [{"kind": kind, "text": text} for kind, text in zip(kinds, texts, strict=True)]
     warned: Warned = {"warnings": notices}
     figure = Figure(figsize=(6.4, 4.2), layout="constrained")

@@ -18,7 +18,8 @@ def robot_view(folder: Path) -> list[Block]:
     known = [tension for row in scene["tensions_N"] for tension in row if tension is not None]
     about = []
     if known:
-        low, high = number(min(known)), number(max(known))
+        low = number(min(known))
+        high = number(max(known))
         reach = f"from {low} N (blue) to {high} N (red)"
         about.append(f"Wires coloured by their median tension, {reach}; a broken line is a slack wire.")
     if scene["drifted"]:

@@ -69,7 +69,8 @@ def _most_frequent(rows: list[Row]) -> list[str]:
 
 def _interval(row: Row, name: str) -> list[float]:
     """Ends and median of a parameter; creep per metre of length."""
-    quantiles, length_mm = row["parameters"][name], row["length_mm"]
+    quantiles = row["parameters"][name]
+    length_mm = row["length_mm"]
     scale = 1.0
     if name == "B" and length_mm:
         scale = 1e3 / length_mm

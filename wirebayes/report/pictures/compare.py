@@ -105,7 +105,8 @@ def held_out_errors(name: str, table: ComparedModels) -> Figure:
 
 def _scatter_errors(axes: Any, rows: list[ComparedModel], way: Way, colour: str, label: str) -> None:
     """The error of each model that was scored in one way."""
-    errors, places = [], []
+    errors = []
+    places = []
     for place, row in enumerate(rows):
         held = row["held_out"]
         scores = held[way] if held else None

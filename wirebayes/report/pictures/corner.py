@@ -92,7 +92,8 @@ def _histograms(axes: Any, unit: Sequence[Array]) -> None:
 def _grid(count: int) -> tuple[Figure, Any]:
     """One pair of axes, on which every cell is a unit square: a pair for each cell takes seconds to draw."""
     left, below = 0.9, 0.8  # room for three lines
-    width, height = 1.1 * count + left + 0.05, 1.05 * count + below + 0.05
+    width = 1.1 * count + left + 0.05
+    height = 1.05 * count + below + 0.05
     figure = Figure(figsize=(width, height))
     axes: Any = figure.add_axes((left / width, below / height, 1.1 * count / width, 1.05 * count / height))
     axes.set_axis_off()
@@ -152,7 +153,8 @@ def _few_ticks(values: Array, is_log: bool) -> tuple[Array, list[str]]:
     low, high = _ends(values)
     width = high - low
     margin = 0.05 * width  # labels of neighbouring cells do not touch
-    first, last = low + margin, high - margin
+    first = low + margin
+    last = high - margin
     if is_log:
         ticks = _logarithmic_ticks(first, last)
         labels = [f"{10**tick:.6g}" for tick in ticks]

@@ -60,7 +60,8 @@ def before_and_after(plain: Stored, final: Stored, verdict: ExperimentFindings) 
     above, *axes = figure.subplots(1 + panels, 1, sharex=True, height_ratios=ratios)
     _draw_curves(above, plain, shown)
     sample = plain.sample
-    name, control = sample.name, sample.protocol.control
+    name = sample.name
+    control = sample.protocol.control
     unit = READ_UNIT[control]
     held = verdict["held_out"]["holds"]
     for axis, (title, stored, _) in zip(axes, shown, strict=True):

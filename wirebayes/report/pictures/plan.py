@@ -85,7 +85,8 @@ def _draw_widths(axes: Any, row: JudgedProtocol, names: Sequence[str], shift: fl
 
 
 def _draw_effects(axes: Any, row: JudgedProtocol, effects: Sequence[str], shift: float, colour: str) -> None:
-    places, times = [], []
+    places = []
+    times = []
     for place, name in enumerate(effects):
         power = row["effects"].get(name)
         if power is not None and power["delta_80"]:

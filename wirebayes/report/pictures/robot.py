@@ -49,7 +49,8 @@ def save_pose(folder: Path, robot: Robot, request: PoseRequest, found: PoseAnswe
     if course is None or not course.found.any():
         return
     content = found.content
-    drift, shares = content["drift"], content["variance_shares"]
+    drift = content["drift"]
+    shares = content["variance_shares"]
     pictures = {}
     pictures["robot"] = scene(robot, request.position_m, request.rotation, course)
     pictures["drift"] = in_time(drift, "distance_mm", "distance from the pose, mm", "Drift")
@@ -214,14 +215,17 @@ def platform_edges(points: Floats) -> Iterator[tuple[int, int]]:
         return
     if is_flat:
         yield from ((int(i), int(j)) for i, j in hull.simplices)
-        return
+    else:
+        yield from _sharp_edges(hull)
+
+
+def _sharp_edges(hull: ConvexHull) -> Iterator[tuple[int, int]]:
+    """The edges of a body at which its faces meet at an angle."""
     normals: dict[tuple[int, int], list[Floats]] = {}
     for simplex, equation in zip(hull.simplices, hull.equations, strict=True):
-        normal = equation[:3]
         for k in range(3):
             i, j = sorted((int(simplex[k]), int(simplex[k - 1])))
-            of_edge = normals.setdefault((i, j), [])
-            of_edge.append(normal)
+            normals.setdefault((i, j), []).append(equation[:3])
     for edge, (one, other) in normals.items():
         if one @ other < 0.99:
             yield edge

@@ -127,7 +127,8 @@ def _draw_payload(axes: Any, times: Floats, payload_kg: Floats) -> None:
 
 def _shapes(robot: Robot, found: HistoryAnswer, rows: Indices) -> tuple[Floats, Floats, float]:
     """Platform points meant and drifted, ``(r, w, 3)``, the drift enlarged by a round factor."""
-    followed, to = found.found, found.to
+    followed = found.found
+    to = found.to
     assert followed is not None and to is not None
     meant_position = to.position_m[rows]
     meant_rotation = to.rotation[rows]

@@ -9,14 +9,13 @@ from wirebayes.errors import InputError
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.joint_columns import joint_columns, joint_values
+from wirebayes.robot.mechanics.joint_columns import POSITION, TURN, joint_columns, joint_values
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import plausible
 from wirebayes.sentences import counted
 from wirebayes.strict.files import read_text
 from wirebayes.strict.table import LARGEST_READING, CsvTable, Header, Numbers, csv_table
 
-POSITION, TURN = ("x_m", "y_m", "z_m"), ("rx_rad", "ry_rad", "rz_rad")
 PAYLOAD, CENTRE = "payload_kg", ("payload_x_m", "payload_y_m", "payload_z_m")
 TILT = ("roll_deg", "pitch_deg")
 
@@ -112,7 +111,7 @@ def _refuse_unlikely(robot: Robot, history: History, table: CsvTable, joints: Se
     if history.joint_m is not None:
         plausible.refuse(robot, history.joint_m, table, joints)
     if history.position_m is not None:
-        plausible.refuse_far(robot, history.position_m, table, POSITION)
+        plausible.refuse_far(robot, history.position_m, table)
 
 
 def _refuse_late(table: CsvTable, time_s: Floats) -> None:

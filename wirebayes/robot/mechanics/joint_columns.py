@@ -1,4 +1,7 @@
-"""Columns of joint values in tables: metres of wire, angles of motors, or straight millimetres as firmware counts."""
+"""Columns of poses and of joint values in tables.
+
+Joint values are metres of wire, angles of motors, or straight millimetres as firmware counts.
+"""
 
 from collections.abc import Sequence
 
@@ -11,6 +14,8 @@ from wirebayes.robot.mechanics.firmware import wire_of
 from wirebayes.robot.mechanics.winches import of_each_leg, of_each_winch
 from wirebayes.sentences import short
 
+POSITION = ("x_m", "y_m", "z_m")
+TURN = ("rx_rad", "ry_rad", "rz_rad")  # of a rotation vector
 _MOTOR, _STRAIGHT = "motor_", "straight_"
 
 

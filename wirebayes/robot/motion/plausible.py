@@ -16,7 +16,7 @@ from wirebayes.result_warnings import Notice
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.draws import WireDraws, lines_of
-from wirebayes.robot.mechanics.joint_columns import column_of_leg, joint_unit_told, meant
+from wirebayes.robot.mechanics.joint_columns import POSITION, column_of_leg, joint_unit_told, meant
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
@@ -92,7 +92,7 @@ def refuse(robot: Robot, joint_m: Floats, table: CsvTable, columns: Sequence[str
     raise table.complain(row, column, found, expected + joint_unit_told(column))
 
 
-def refuse_far(robot: Robot, position_m: Floats, table: CsvTable, columns: Sequence[str]) -> None:
+def refuse_far(robot: Robot, position_m: Floats, table: CsvTable) -> None:
     """Refuse positions of a table that lie far outside the robot.
 
     Parameters
@@ -102,8 +102,6 @@ def refuse_far(robot: Robot, position_m: Floats, table: CsvTable, columns: Seque
         NaN where they are not known.
     table : CsvTable
         Where they were read, a row a time.
-    columns : sequence of str
-        The columns of the positions.
 
     Raises
     ------
@@ -115,7 +113,8 @@ def refuse_far(robot: Robot, position_m: Floats, table: CsvTable, columns: Seque
     if far.any():
         row, axis = _first(far)
         expected = f"metres, at most {number(most)} from home, {_FAR:g} times the robot's size"
-        raise table.complain(row, columns[axis], shown(table.cell(row, columns[axis])), expected)
+        column = POSITION[axis]
+        raise table.complain(row, column, shown(table.cell(row, column)), expected)
 
 
 def robot_notices(robot: Robot) -> list[Notice]:

@@ -106,10 +106,13 @@ def calibration_report(
     rng = np.random.default_rng(seed)
     holds = holds_of(robot, session, readings)
     search = searched(Unknowns(robot, prior, errors), holds, rng, poses, progress)
-    found, holds, seen = search.found, search.holds, identified(search.found)
+    found = search.found
+    holds = search.holds
+    seen = identified(search.found)
     ahead = next_poses(found, holds, visits, rng) if found.converged else NextPoses(np.empty((0, 3)), np.empty(0))
     requested = session if poses is StatedPoses.REQUESTED else None
-    s, verdict = summarised(found), _Verdict(search, seen, contradicted_requests(found, requested))
+    s = summarised(found)
+    verdict = _Verdict(search, seen, contradicted_requests(found, requested))
     content: CalibrateJson = {
         "version": 2,
         "robot": robot.name,
@@ -284,12 +287,14 @@ def joint_values_to(found: RobotPosterior, position_m: Floats, turn: Floats) -> 
     there = moved(unknowns.robot, parts)
     pose = position_m[None], turn[None]
     tau = inverse.tensions(there, *pose)
-    strain, reference = found.creep.strain[-1][:, None], parts.reference_m[:, None]
+    strain = found.creep.strain[-1][:, None]
+    reference = parts.reference_m[:, None]
     return inverse.commands(there, wires, *pose, tau, strain, reference).joint_m[0]
 
 
 def _warnings(verdict: _Verdict) -> list[Notice]:
-    search, found = verdict.search, verdict.search.found
+    search = verdict.search
+    found = verdict.search.found
     robot = found.unknowns.robot
     out = [*verdict.contradicted, *plausible.robot_notices(robot), *home.home_notices(robot)]
     if not found.converged:

@@ -56,7 +56,8 @@ def calibrated(found: RobotPosterior, session: Session) -> Calibrated:
         Biases of its sensors, and its geometry, are averaged over.
     session : Session
     """
-    unknowns, state = found.unknowns, found.state
+    unknowns = found.unknowns
+    state = found.state
     _, root = unknowns.moments
     at = unknowns.slices["wires"]
     own = replace(unknowns.prior, bias_sd_N=0.0)

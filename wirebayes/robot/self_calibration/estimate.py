@@ -169,11 +169,15 @@ class _Search:
     def __init__(
         self, unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown, others_follow: bool
     ) -> None:
-        self.unknowns, self.holds = unknowns, holds
+        self.unknowns = unknowns
+        self.holds = holds
         self.others_follow = others_follow
-        self.noise, self.state, self.creep = noise, state, creep
+        self.noise = noise
+        self.state = state
+        self.creep = creep
         self.passed = [state]
-        self.roughly, self.cost = ROUGHLY, np.inf
+        self.roughly = ROUGHLY
+        self.cost = np.inf
         self.came_down = self.each = False
         self.rounds: list[tuple[Floats, Floats]] = []
         self.opened_m: list[float] = []
@@ -244,7 +248,8 @@ class _Search:
         since = self.passed[-1]
         self.creep = creep_of(self.unknowns, self.holds, since, self.creep, self.roughly, self.each)
         down = descend(self.unknowns, self.holds, self.noise, self.state, self.creep, since)
-        self.state, self.came_down = down.state, down.converged
+        self.state = down.state
+        self.came_down = down.converged
         found = gaussian_posterior(self.unknowns, down, self.noise, self.creep, self.last_m)
         shown, degrees = noise_shown(found, *self.usual)
         thought = np.log([self.noise.joint_m, self.noise.balance])
@@ -280,7 +285,8 @@ def _no_nearer(sizes: list[float], small: float = 0.0) -> bool:
     small : float
         A size up to which nothing is left to fall.
     """
-    before, since = sizes[:-_STALLED], sizes[-_STALLED:]
+    before = sizes[:-_STALLED]
+    since = sizes[-_STALLED:]
     return bool(before) and min(sizes) > small and min(since) > _NEARER * min(before)
 
 
@@ -302,7 +308,8 @@ def _given_up(opened_m: list[float], hopeless_m: float, far_m: float) -> bool:
 def _before_reading(unknowns: Unknowns, holds: Holds) -> Noise:
     """What is stated of every noise, or usual."""
     rule = unknowns.robot.rule
-    low, high = rule.lowest_N, rule.highest_N
+    low = rule.lowest_N
+    high = rule.highest_N
     usual = 0.5 * (low + high) if rule.choice == "middle" else low
     finest = low
     read = np.isfinite(holds.tension_N)

@@ -66,7 +66,8 @@ def holds(
         Longest step in the logarithm of time between tension updates; the first is a thousandth of the hold.
     """
     n, legs = error_m.shape
-    state, pace = fresh(legs, n), _Pace(_FIRST, longest_step)
+    state = fresh(legs, n)
+    pace = _Pace(_FIRST, longest_step)
     starts = zip(session.position_m, session.rotation, strict=True)
     for joint, duration, start in zip(session.joint_m, session.duration_s, starts, strict=True):
         bare, offset = inverse.lengths(robot, np.broadcast_to(joint, (n, legs)))
@@ -101,7 +102,9 @@ class _Walk:
         carried: CreepState,
         resolved_N: float,
     ) -> None:
-        self.robot, self.wires, self.resolved_N = robot, wires, resolved_N
+        self.robot = robot
+        self.wires = wires
+        self.resolved_N = resolved_N
         self.bare, self.offset = lengths
         self.size = robot.size_m if robot.degrees == 6 else robot.span_m  # what small motions are small beside
         zero = self._zero(carried)
@@ -122,7 +125,8 @@ class _Walk:
         longest : float
             Step, in the logarithm of time.
         """
-        step, taken = pace.next, 0
+        step = pace.next
+        taken = 0
         opening = None
         while self.creep.time_s < duration_s:
             free = taken >= _MOST
@@ -159,7 +163,8 @@ class _Walk:
         motion, change = observability.length_sensitivity(
             self.robot, self.wires, here.position_m, here.rotation, zero, offset
         )
-        motion, change = motion * zero[:, None], change * zero[:, None]
+        motion = motion * zero[:, None]
+        change = change * zero[:, None]
         finite = np.isfinite(change).all((1, 2)) & np.isfinite(motion).all((1, 2))
         motion[:, 3:] *= self.robot.size_m
         held = here.found & finite

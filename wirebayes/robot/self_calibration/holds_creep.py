@@ -87,7 +87,8 @@ class _Here:
         self.response = self._response()
 
     def _response(self) -> Floats:
-        position, rotation = self.state.position_m, self.state.rotation
+        position = self.state.position_m
+        rotation = self.state.rotation
         _, change = observability.length_sensitivity(self.robot, self.wires, position, rotation, self.zero, self.offset)
         by_strain = change * self.zero[:, None]
         stiffest = 2 * np.max(self.wires.theta["k1"])
@@ -113,7 +114,8 @@ class _Here:
         hold = np.repeat(np.arange(p), t)
         zero = self.zero[:, None] * (1 + ahead)
         wires = self.wires.part(np.zeros(p * t, int))
-        position, rotation = self.state.position_m[hold], self.state.rotation[hold]
+        position = self.state.position_m[hold]
+        rotation = self.state.rotation[hold]
         found = forward.solve_equilibrium(self.robot, wires, zero.reshape(-1, w), self.offset[hold], position, rotation)
         tension = np.where(found.found[:, None], found.tension_N, np.nan)
         return tension.reshape(p, t, w)

@@ -137,7 +137,8 @@ def _sizes(found: RobotPosterior) -> Floats:
 
 def _of_exit_points(found: RobotPosterior) -> list[Combination]:
     """How well each motion of all exit points together is known."""
-    robot, at = found.unknowns.robot, found.unknowns.slices["exit"]
+    robot = found.unknowns.robot
+    at = found.unknowns.slices["exit"]
     inside = found.covariance[at, at]
     before = 1e3 * found.unknowns.errors.exit_m / np.sqrt(len(robot.exit_m))
     out = []

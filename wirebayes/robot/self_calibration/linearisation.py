@@ -108,8 +108,11 @@ class _Lengths:
 
     @classmethod
     def at(cls, about: _About, creep: Grown, since: State) -> "_Lengths":
-        robot, parts, state = about.unknowns.robot, about.parts, about.state
-        joint_m, linear = about.holds.session.joint_m, robot.is_linear
+        robot = about.unknowns.robot
+        parts = about.parts
+        state = about.state
+        joint_m = about.holds.session.joint_m
+        linear = robot.is_linear
         bare, offset = inverse.lengths(robot, joint_m)
         drawn = robot.ratio * joint_m * linear + joint_m * ~linear
         bare = bare + parts.reference_m + parts.drum * drawn * ~linear
@@ -143,7 +146,8 @@ class _Lengths:
 
 def _more_creep(about: _About, creep: Grown, since: State) -> Floats:
     """(p, w) creep strain, to first order, that a state has beyond the one since which creep was not simulated."""
-    state, wires = about.state, about.unknowns.slices["wires"]
+    state = about.state
+    wires = about.unknowns.slices["wires"]
     change = state.white[wires] - since.white[wires]
     by_tension = np.einsum("hkw,kw->hw", creep.by_pull, state.pull_N - since.pull_N)
     return creep.by_wires @ change + by_tension
@@ -163,8 +167,10 @@ def _by_earlier(about: _About, creep: Grown, lengths: _Lengths) -> Floats | None
 
 def _loops(out: Equations, about: _About, creep: Grown, lengths: _Lengths) -> None:
     """Every wire is as long as its way: stretched from what the joint value, its reference and creep make of it."""
-    robot, unknowns = about.here, about.unknowns
-    loop, d = out.rows["loop"], robot.degrees
+    robot = about.here
+    unknowns = about.unknowns
+    loop = out.rows["loop"]
+    d = robot.degrees
     leg = np.arange(robot.legs)
     way = statics.stretched(robot, about.shape, lengths.offset.T).T
     out.residual[:, loop] = way - lengths.bare * lengths.longer
@@ -179,7 +185,8 @@ def _loops(out: Equations, about: _About, creep: Grown, lengths: _Lengths) -> No
 
 def _loops_by_wires(out: Equations, about: _About, lengths: _Lengths, creep: Grown) -> None:
     """Slopes by the wires' unknowns, the errors of the reference lengths among them."""
-    unknowns, leg = about.unknowns, np.arange(about.here.legs)
+    unknowns = about.unknowns
+    leg = np.arange(about.here.legs)
     wires = out.by_robot[:, out.rows["loop"], unknowns.slices["wires"]]
     wires -= lengths.bare[..., None] * lengths.by_wires(creep)
     wires[:, leg, leg] -= lengths.longer * unknowns.prior.reference_sd_m
@@ -200,7 +207,8 @@ def _loops_by_drum(out: Equations, unknowns: Unknowns, lengths: _Lengths) -> Non
 
 def _weigh_loops(out: Equations, robot: Robot, noise: Noise) -> None:
     """Equations of the wires in standard deviations of their errors, which are made independent."""
-    loop, alone = out.rows["loop"], _errors_apart(robot)
+    loop = out.rows["loop"]
+    alone = _errors_apart(robot)
     for values in (out.residual, out.by_robot, out.by_hold):
         values[:, loop] /= noise.joint_m
         if alone is not None:
@@ -221,7 +229,8 @@ def _errors_apart(robot: Robot) -> Floats | None:
 
 def _balance(out: Equations, about: _About) -> None:
     """The wires carry the platform."""
-    robot, noise = about.here, about.noise
+    robot = about.here
+    noise = about.noise
     d = robot.degrees
     scale = robot.edge_scale
     pull, taut = pulled(about.state.pull_N, noise.soft_N)
@@ -298,8 +307,10 @@ def _turn_of_pull(shape: statics.Geometry, tau: Floats) -> Floats:
 def _tensions(out: Equations, about: _About) -> None:
     """Tensions that were read, and what is usual where none was."""
     read = np.isfinite(about.holds.tension_N)
-    rows, leg = out.rows["tension"], np.arange(about.here.legs)
-    sd_N, pull_N = about.holds.session.tension_sd_N, about.noise.pull_N
+    rows = out.rows["tension"]
+    leg = np.arange(about.here.legs)
+    sd_N = about.holds.session.tension_sd_N
+    pull_N = about.noise.pull_N
     pull, taut = pulled(about.state.pull_N, about.noise.soft_N)
     out.known[:, rows] = read
     out.residual[:, rows] = np.where(read, _off_reading(about, pull) / sd_N, _off_usual(about) / pull_N)
@@ -321,7 +332,8 @@ def _off_usual(about: _About) -> Floats:
 
 def _tensions_by_robot(out: Equations, about: _About, read: Bools) -> None:
     """Slopes by levels and by the sensors' biases, where these are unknown."""
-    unknowns, session = about.unknowns, about.holds.session
+    unknowns = about.unknowns
+    session = about.holds.session
     legs = unknowns.robot.legs
     leg = np.arange(legs)
     row = out.rows["tension"].start + leg
@@ -340,9 +352,11 @@ def _tensions_by_robot(out: Equations, about: _About, read: Bools) -> None:
 
 def _poses(out: Equations, about: _About) -> None:
     """Poses that were stated."""
-    robot, rows = about.unknowns.robot, out.rows["pose"]
+    robot = about.unknowns.robot
+    rows = out.rows["pose"]
     sd = max(about.unknowns.errors.pose_m, EXACT * robot.span_m)
-    known, residual = out.known[:, rows], out.residual[:, rows]
+    known = out.known[:, rows]
+    residual = out.residual[:, rows]
     known[:, :3] = about.holds.placed[:, None]
     residual[:, :3] = _displaced(about) / sd
     if robot.degrees == 6:
@@ -366,10 +380,12 @@ def _turned(about: _About) -> Floats:
 
 def _tilts(out: Equations, about: _About) -> None:
     """Components of the platform's normal that an inclinometer read."""
-    tilt, sd = about.holds.tilt, about.holds.session.tilt_sd_rad
+    tilt = about.holds.tilt
+    sd = about.holds.session.tilt_sd_rad
     if tilt is None or sd is None:
         return
-    rows, read = out.rows["tilt"], np.isfinite(tilt)
+    rows = out.rows["tilt"]
+    read = np.isfinite(tilt)
     normal = about.state.rotation[:, :, 2]
     out.known[:, rows] = read
     out.residual[:, rows] = np.where(read, normal[:, :2] - tilt, 0.0) / sd

@@ -71,7 +71,8 @@ def tension_notices(robot: Robot, session: Session, readings: Floats) -> list[No
     if not count:
         return []
     usual = float(np.nanmedian(readings[:count])) * session.tension_sd_N
-    low, high = robot.rule.lowest_N, robot.rule.highest_N
+    low = robot.rule.lowest_N
+    high = robot.rule.highest_N
     if low / _OUTSIDE <= usual <= _OUTSIDE * high:
         return []
     text = (

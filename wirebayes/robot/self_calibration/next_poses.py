@@ -120,7 +120,8 @@ def _rms(covariance: Floats, root: Floats, poses: int) -> float:
 
 def _as_read(holds: Holds, poses: _Candidates) -> Holds:
     """Candidates as holds, with what most of the session's holds have."""
-    session, n = holds.session, len(poses.x)
+    session = holds.session
+    n = len(poses.x)
     read = bool(np.isfinite(holds.tension_N).all(1).mean() >= 0.5)
     there = Session(
         poses.x,
@@ -151,7 +152,8 @@ def _at(found: RobotPosterior, holds: Holds, poses: _Candidates) -> Equations:
 
 def _information(e: Equations) -> Floats:
     """(n, m, m) what each hold says of the robot's unknowns."""
-    by_hold, by_robot = e.by_hold, e.by_robot
+    by_hold = e.by_hold
+    by_robot = e.by_robot
     mixed = by_hold.mT @ by_robot
     follows = solve(by_hold.mT @ by_hold, mixed)
     return by_robot.mT @ by_robot - mixed.mT @ follows

@@ -46,7 +46,8 @@ def most_open(found: RobotPosterior, session: Session) -> str:
 def _open_wires(share: Floats) -> list[str]:
     """The wire or two that have most of what is open; none where all have their part."""
     order = np.argsort(share)[::-1]
-    largest, two_largest = share[order[0]], share[order[:2]].sum()
+    largest = share[order[0]]
+    two_largest = share[order[:2]].sum()
     if len(share) >= _WIRES and largest > _ONE:
         return [f"joint value {order[0] + 1} ({100 * largest:.0f} % of the sum of squares)"]
     if len(share) >= _MORE_WIRES and two_largest > _TWO:
@@ -64,10 +65,12 @@ def odd_hold(found: RobotPosterior, session: Session) -> list[Notice]:
         Of a search that converged.
     session : Session
     """
-    unknowns, equations = found.unknowns, found.equations
+    unknowns = found.unknowns
+    equations = found.equations
     if unknowns.errors.joint_m is not None:
         return []  # then the joint test knows
-    robot, joint_m = unknowns.robot, found.noise.joint_m
+    robot = unknowns.robot
+    joint_m = found.noise.joint_m
     share = _shares(found).sum(1)
     p = _chances(found, share)
     worst = int(p.argmin())
@@ -93,7 +96,8 @@ def contradicted_requests(found: RobotPosterior, requested: Session | None) -> l
     """
     if requested is None or not found.converged:
         return []
-    robot, prior = found.unknowns.robot, found.unknowns.prior
+    robot = found.unknowns.robot
+    prior = found.unknowns.prior
     shift = np.linalg.norm(found.state.position_m - requested.position_m, axis=1)
     turn = rotation.vector(requested.rotation.mT @ found.state.rotation)
     angle = np.linalg.norm(turn, axis=1)

@@ -76,11 +76,14 @@ def gaussian_posterior(unknowns: Unknowns, down: Descent, noise: Noise, creep: G
         Lengths that the last joint values stand for, without reference errors.
     """
     normal = eliminated(down.equations, down.state.white, 0.0)
-    covariance, by_robot = inv(normal.matrix), normal.by_robot
+    covariance = inv(normal.matrix)
+    by_robot = normal.by_robot
     hold = normal.inverse + by_robot @ covariance @ by_robot.mT
     finite = bool(np.isfinite(covariance).all() and np.isfinite(hold).all() and (np.diag(covariance) > 0).all())
     if not finite:  # a search that ended nowhere leaves what was known before
-        covariance, by_robot, hold = np.eye(len(covariance)), np.zeros_like(by_robot), np.zeros_like(hold)
+        covariance = np.eye(len(covariance))
+        by_robot = np.zeros_like(by_robot)
+        hold = np.zeros_like(hold)
     good = down.converged and finite and bool(np.isfinite(down.cost))
     return RobotPosterior(
         unknowns=unknowns,
@@ -106,10 +109,12 @@ def at_joint_error(found: RobotPosterior, factor: float) -> RobotPosterior:
     found : RobotPosterior
     factor : float
     """
-    e, white = found.equations, found.state.white
+    e = found.equations
+    white = found.state.white
     unit = np.ones(e.residual.shape[1])
     unit[e.rows["loop"]] /= factor
-    by_robot, by_hold = e.by_robot * unit[:, None], e.by_hold * unit[:, None]
+    by_robot = e.by_robot * unit[:, None]
+    by_hold = e.by_hold * unit[:, None]
     there = replace(e, residual=e.residual * unit, by_robot=by_robot, by_hold=by_hold)
     down = Descent(found.state, there, cost_of(there, white), found.converged)
     noise = replace(found.noise, joint_m=found.noise.joint_m * factor)

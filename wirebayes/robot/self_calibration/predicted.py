@@ -61,7 +61,10 @@ def predict_session(
     """
     wires, error = prior.wires(robot, unknowns)
     bias = prior.bias_N(robot.legs, unknowns)
-    solved, read, tensions, lengths = [], [], [], []
+    solved = []
+    read = []
+    tensions = []
+    lengths = []
     for k, hold in enumerate(holds(robot, wires, error, session, session.tension_sd_N, longest_step)):
         strain = hold.state.strain(wires).T
         length = hold.bare_m * (1 + strain)

@@ -57,7 +57,8 @@ def lengths_tell(unknowns: Unknowns, read: Bools) -> bool:
 
 def _joint_probability(found: RobotPosterior) -> float:
     """`trust.joint_test` of what was read and stated."""
-    e, unknowns = found.equations, found.unknowns
+    e = found.equations
+    unknowns = found.unknowns
     holds, _, own = e.by_hold.shape
     count = float(e.known.sum()) - holds * own + _taken_up(found)
     cost = np.array([found.cost - _beyond_usual(found)])
@@ -89,7 +90,8 @@ def _unread(found: RobotPosterior) -> Bools:
 
 def misfit(found: RobotPosterior) -> float:
     """Mean squared residual of what was read or stated with an error, the balance aside."""
-    e, errors = found.equations, found.unknowns.errors
+    e = found.equations
+    errors = found.unknowns.errors
     exact = {"balance"}
     if errors.joint_m == 0:
         exact.add("loop")
@@ -134,7 +136,8 @@ def most_open_m(found: RobotPosterior, share: float) -> float:
     found : RobotPosterior
     share : float
     """
-    robot, stated = found.unknowns.robot, found.unknowns.errors.joint_m
+    robot = found.unknowns.robot
+    stated = found.unknowns.errors.joint_m
     line = (stated or 0.0) * float(np.sqrt(np.mean(1.0 / robot.lines**2)))
     return max(share * robot.span_m, _EXPLAINED * line)
 
@@ -147,7 +150,8 @@ def usual_joint(robot: Robot, holds: Holds) -> tuple[float, float]:
 
 def joint_error(unknowns: Unknowns, holds: Holds) -> float:
     """Error of a joint value before anything was read, m: as stated, or usual."""
-    stated, robot = unknowns.errors.joint_m, unknowns.robot
+    stated = unknowns.errors.joint_m
+    robot = unknowns.robot
     return usual_joint(robot, holds)[0] if stated is None else max(stated, EXACT * robot.span_m)
 
 
@@ -162,7 +166,8 @@ def noise_shown(found: RobotPosterior, usual_m: float, worth: float) -> tuple[Fl
     usual_m, worth : float
         What `usual_joint` returned.
     """
-    robot, stated = found.unknowns.robot, found.unknowns.errors.joint_m
+    robot = found.unknowns.robot
+    stated = found.unknowns.errors.joint_m
     balance, _ = _shown(found, "balance", found.noise.balance, FRICTIONLESS, _LEAST_DEGREES)
     balance = float(np.clip(balance, 1e-2 * FRICTIONLESS, 1e2))
     if stated is not None:  # every error is: what is left unbalanced then speaks against them

@@ -44,7 +44,8 @@ def seed(unknowns: Unknowns, holds: Holds, white: Floats, rng: Generator) -> Sta
     rng : numpy Generator
         Draws the places that the search begins from.
     """
-    robot, session = unknowns.robot, holds.session
+    robot = unknowns.robot
+    session = holds.session
     lowest_N = robot.rule.lowest_N
     unread = ~np.isfinite(holds.tension_N)
     pull = np.where(unread, lowest_N, holds.tension_N)
@@ -173,7 +174,8 @@ class _PoseSearch:
     def _toward_home(self, x: Floats, R: Floats) -> tuple[Floats, Floats]:
         """(n, d) how far poses are from workspace and home, and (d,) the slopes of that."""
         robot = self.robot
-        toward, pull = np.zeros((x.shape[1], robot.degrees)), np.ones(robot.degrees)
+        toward = np.zeros((x.shape[1], robot.degrees))
+        pull = np.ones(robot.degrees)
         pull[:3] = robot.span_m / (10 * self.half)
         toward[:, :3] = (x.T - self.middle) * pull[:3]
         if robot.degrees == 6:
@@ -347,7 +349,8 @@ def near_requests(unknowns: Unknowns, holds: Holds) -> Holds:
     holds : Holds
         With the poses that the robot was sent to.
     """
-    robot, session = unknowns.robot, holds.session
+    robot = unknowns.robot
+    session = holds.session
     bare, offset = inverse.lengths(robot, session.joint_m)
     gap = statics.stretched_at(robot, session.position_m, session.rotation, offset) - bare
     largest = np.abs(gap / robot.lines).max(1)

@@ -117,7 +117,8 @@ def suspects(found: RobotPosterior, holds: Holds, progress: ShareDone = lambda s
     bias = np.full(legs, np.inf)
     for part in shares_of(progress, _TRIES):
         other = estimate(free, holds, state, part)
-        state, before = other.state, bias
+        state = other.state
+        before = bias
         bias = widest * state.white[sensors]
         covariance = widest**2 * other.covariance[sensors, sensors]
         sd = np.sqrt(np.diag(covariance))

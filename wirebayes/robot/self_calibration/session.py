@@ -73,7 +73,8 @@ class Session:
 
     def without_poses(self) -> "Session":
         """The same where nothing is known of the poses."""
-        position, turn = np.full_like(self.position_m, np.nan), np.full(self.rotation.shape, np.nan)
+        position = np.full_like(self.position_m, np.nan)
+        turn = np.full(self.rotation.shape, np.nan)
         return replace(self, position_m=position, rotation=turn)
 
     @property

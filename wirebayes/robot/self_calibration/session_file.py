@@ -9,7 +9,7 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.joint_columns import joint_columns, joint_values
+from wirebayes.robot.mechanics.joint_columns import POSITION, TURN, joint_columns, joint_values
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import plausible
 from wirebayes.robot.self_calibration.mistaken import refuse_mistaken
@@ -17,7 +17,6 @@ from wirebayes.robot.self_calibration.session import Session
 from wirebayes.strict.files import read_text
 from wirebayes.strict.table import LARGEST_READING, CsvTable, Header, Numbers, csv_table
 
-POSITION, TURN = ("x_m", "y_m", "z_m"), ("rx_rad", "ry_rad", "rz_rad")
 NORMAL = ("normal_x", "normal_y")
 _NOISE = 5.0  # standard errors: so far below zero a slack wire may read, once in millions of readings
 
@@ -97,8 +96,10 @@ def parse_session(
         Naming line and column, what was found and what was expected.
     """
     table.check_header(columns(robot, table.header))
-    motions, tensions = _of_legs(robot, "motion_{}"), _of_legs(robot, "tension_{}_N")
-    moved, tilted = motions[0] in table.header, NORMAL[0] in table.header
+    motions = _of_legs(robot, "motion_{}")
+    tensions = _of_legs(robot, "tension_{}_N")
+    moved = motions[0] in table.header
+    tilted = NORMAL[0] in table.header
     if moved and not biased:
         raise _motions_without_bias(table)
     cells = table.numbers(lambda name: _allowed(name, tension_sd_N, biased))
@@ -111,9 +112,11 @@ def parse_session(
     joints = joint_columns(robot, table.header)
     joint = joint_values(robot, joints, some(joints))
     plausible.refuse(robot, joint, table, joints)
-    tension, normal = some(tensions), some(NORMAL if tilted else ())
-    position, turn = some(POSITION), some(TURN)
-    plausible.refuse_far(robot, position, table, POSITION)
+    tension = some(tensions)
+    normal = some(NORMAL if tilted else ())
+    position = some(POSITION)
+    turn = some(TURN)
+    plausible.refuse_far(robot, position, table)
     was_read = np.asarray(np.isfinite(tension).any(1))
     if tilted:
         _refuse_half(table, normal, "the normal")
@@ -133,7 +136,8 @@ def parse_session(
     )
     refuse_mistaken(robot, session, tension, table, joints)
     # without any tension read, what is left is for the calibration of the whole robot
-    read_N, read_normal = tension[was_read].ravel(), normal[was_read].ravel()
+    read_N = tension[was_read].ravel()
+    read_normal = normal[was_read].ravel()
     return session, np.concatenate([read_N / tension_sd_N, read_normal / tilt_sd_rad])
 
 

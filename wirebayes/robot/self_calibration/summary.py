@@ -74,7 +74,8 @@ def summarised(found: RobotPosterior) -> Summary:
 
 
 def _means(found: RobotPosterior) -> dict[str, Floats]:
-    state, parts = found.state, found.unknowns.parts(found.state.white)
+    state = found.state
+    parts = found.unknowns.parts(found.state.white)
     return {
         "exit_m": parts.exit_m,
         "platform_m": parts.platform_m,
@@ -98,7 +99,8 @@ def _half(sd: Floats, wider: Floats, degrees: float) -> Floats:
 
 def _slope_of_lengths(found: RobotPosterior) -> Floats:
     """The last zero-tension lengths by all unknowns: references, drums, and creep with the tensions that it follows."""
-    unknowns, creep = found.unknowns, found.creep
+    unknowns = found.unknowns
+    creep = found.creep
     strain = creep.strain[-1]
     bare = found.last_m + unknowns.parts(found.state.white).reference_m
     leg = np.arange(len(bare))
@@ -112,9 +114,12 @@ def _slope_of_lengths(found: RobotPosterior) -> Floats:
 
 
 def _standard_deviations(found: RobotPosterior) -> dict[str, Floats]:
-    unknowns, errors = found.unknowns, found.unknowns.errors
-    robot, prior = unknowns.robot, unknowns.prior
-    w, d = robot.legs, robot.degrees
+    unknowns = found.unknowns
+    errors = found.unknowns.errors
+    robot = unknowns.robot
+    prior = unknowns.prior
+    w = robot.legs
+    d = robot.degrees
     sd = np.sqrt(np.diag(found.covariance))
     variance = np.einsum("pii->pi", found.hold_covariance)
     hold = np.sqrt(np.maximum(variance, 0.0))

@@ -137,7 +137,8 @@ class Unknowns:
 
     def parts(self, white: Floats) -> Parts:
         """Physical values of a vector ``(m,)``."""
-        legs, errors = self.robot.legs, self.errors
+        legs = self.robot.legs
+        errors = self.errors
         mean, root = self.moments
         wires = mean + root @ white[self.slices["wires"]]
         bias = self.prior.bias_N(legs, wires[None])[0]
