@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from wirebayes.errors import InputError
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.robot.mechanics import schema
 
 OPTIONAL = {"k1_N", "B_mm", "length_mm", "wire", "pulley_radius_m", "swivel_axis"} | {
@@ -162,3 +163,13 @@ def test_every_key_of_a_robots_file_is_documented():
     pages = [root / "docs" / f"robot-{name}.rst" for name in ("file", "parts")]
     for text in ((root / "data" / "robots" / "README.md").read_text(), "".join(page.read_text() for page in pages)):
         assert [key for key in sorted(used | OPTIONAL) if f"{key}" not in text] == []
+
+
+def test_a_file_of_tests_and_a_robots_file_are_told_from_each_other(tmp_path):
+    """Each reader names what the other one's file is, not the first key that it does not know."""
+    with pytest.raises(InputError, match=r"key experiment: found a file of tests, .* read by wirebayes fit"):
+        schema.parse('[[experiment]]\nname = "a"\nlength_mm = 1000.0\n', "tests.toml")
+    file = tmp_path / "robot.toml"
+    file.write_text(schema.robot_text("sled-4"), encoding="utf-8")
+    with pytest.raises(InputError, match=r"key leg: found a robot's file, expected tests, .* read by wirebayes pose"):
+        read_experiments(file)

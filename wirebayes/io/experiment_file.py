@@ -93,6 +93,8 @@ def read_experiments(path: str | Path) -> list[Experiment]:
         top = Keys.of_file(source, text)
     except InputError as error:
         raise mistaken_table.complaint(source, error) from None
+    if "leg" in top.table:
+        raise top.complain("leg", "a robot's file", "tests, [[experiment]]; robots are read by wirebayes pose")
     top.only(("experiment", "prior"))
     tables = top.tables("experiment")
     shared = top.priors()

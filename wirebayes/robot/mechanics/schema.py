@@ -92,6 +92,8 @@ def _direction(keys: Keys, key: str) -> Floats:
 
 
 def _robot(top: Keys) -> Robot:
+    if "experiment" in top.table:
+        raise top.complain("experiment", "a file of tests", "a robot with [[leg]]; tests are read by wirebayes fit")
     _check_version(top)
     name, description, source = (top.string(key) for key in ("name", "description", "source"))
     freedom = cast(Freedom, top.string("freedom", default="pose", among=get_args(Freedom)))
