@@ -74,9 +74,8 @@ def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     """Lines about one experiment that something may be missing in: what, how large, and what it is worth."""
     verdict = report["verdict"]
     effects = report["effects"]
-    missing = _verdict(report)
     sure = p_in_words(report["p_global"], report["p_simulations"])
-    lines = [f"{name}: {missing} ({sure})"]
+    lines = [f"{name}: {_verdict(report)} ({sure})"]
     candidates = likely(report)
     if verdict == "unknown" and candidates:
         lines.append(f"  its largest part may be {candidates}")
