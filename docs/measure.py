@@ -41,6 +41,10 @@ STUDIES = {
         "-m analyses.discovery.null_under_weights --tests 200 --rows {folder} --output {folder}/null.json",
         "null.json",
     ),
+    "unknown_bands": (
+        "-m analyses.discovery.unknown_bands --files 120 --rows {folder} --output {folder}/bands.json",
+        "bands.json",
+    ),
     "hidden_any_scale": (
         "-m analyses.discovery.hidden_any_scale --tests 30 --rows {folder} --output {folder}/hidden.json",
         "hidden.json",
@@ -159,6 +163,7 @@ def texts() -> dict[Path, str]:
         DOCS / "weights.inc": intervals.steps_and_weights(kept["weights"]),
         DOCS / "clean-any-scale.inc": discovery.false_alarms_at_any_scale(kept["clean_any_scale"]),
         DOCS / "null-under-weights.inc": discovery.p_under_weights(kept["null_under_weights"]),
+        DOCS / "unknown-bands.inc": discovery.bands_of_the_unknown(kept["unknown_bands"]),
         DOCS / "hidden-any-scale.inc": discovery.hidden_effects_at_any_scale(kept["hidden_any_scale"]),
         DOCS / "calibration.inc": intervals.ranks(kept["calibration"]),
         DOCS / "wires-before.inc": intervals.wires_before(kept["wires_before"]),

@@ -50,6 +50,39 @@ def p_under_weights(kept: dict[str, Any]) -> str:
     return fill(said, 110, break_on_hyphens=False) + "\n"
 
 
+def bands_of_the_unknown(kept: dict[str, Any]) -> str:
+    """A sentence and a table on later readings in the bands of the plain model, and with the smooth discrepancy."""
+    found = kept["result"]
+    words = {
+        "all": "all",
+        "missed": f"of all, where the plain model's bands hold less than {100 * found['missed_below']:.0f} %",
+    }
+    said = (
+        f"{run_of(kept)}. Shares are means over files, with 90 % intervals; errors are relative to the plain model's."
+    )
+    lines = [fill(said, 110, break_on_hyphens=False), ""]
+    lines += table_head(
+        "protocol",
+        "files",
+        "readings in the plain model's bands, %",
+        "in those with the discrepancy, %",
+        "its error, median [10 %, 90 %]",
+    )
+    for name, group in found["groups"].items():
+        if group is None:
+            continue
+        inside = [_percent(group["inside"][model]) for model in ("plain", "smooth")]
+        ratio = group["error_ratio"]
+        error = f"{ratio['median']:.2f} [{ratio['q10']:.2f}, {ratio['q90']:.2f}]"
+        lines += table_row(words.get(name, name), str(group["files"]), *inside, error)
+    return "\n".join(lines) + "\n"
+
+
+def _percent(mean: dict[str, float]) -> str:
+    """A mean share with its interval, in per cent."""
+    return f"{100 * mean['value']:.0f} [{100 * mean['low']:.0f}, {100 * mean['high']:.0f}]"
+
+
 def hidden_effects_at_any_scale(kept: dict[str, Any]) -> str:
     """A paragraph and a table on hidden effects in tests of any scale."""
     found = kept["result"]
