@@ -7,7 +7,8 @@ from scipy import stats
 from wirebayes.errors import InputError
 from wirebayes.model.prior import PowerScaled, Prior, from_table, possible, wire_defaults
 from wirebayes.model.scales import Scales
-from wirebayes.numeric.distributions import Normal, TruncatedNormal, log_density_of
+from wirebayes.numeric.any_distribution import log_density_of
+from wirebayes.numeric.distributions import Normal, TruncatedNormal
 
 SCALES = Scales(step_mm=0.5, range_mm=6.0, tension_N=4.0, hold_s=90.0, step_N=1.0)
 

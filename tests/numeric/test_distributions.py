@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from wirebayes.numeric.distributions import Distribution, LogitNormal, finite_spread, log_density_of, ours, scaled
+from wirebayes.numeric.any_distribution import finite_spread, log_density_of, ours, scaled
+from wirebayes.numeric.distributions import Distribution, LogitNormal
 
 KNOWN = {
     "Normal": stats.norm(0.5, 2.0),

@@ -12,7 +12,7 @@ from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.settings import Settings
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.json_files.discovery import DetectableAmplitude, Outlook
-from wirebayes.numeric.distributions import finite_spread
+from wirebayes.numeric.any_distribution import finite_spread
 from wirebayes.wire.effect import Effect
 
 

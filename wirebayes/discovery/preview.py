@@ -19,7 +19,7 @@ from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.model.problem import Problem
 from wirebayes.model.scales import NATURAL
 from wirebayes.model.spec import PLAIN_SPEC
-from wirebayes.numeric.distributions import finite_spread
+from wirebayes.numeric.any_distribution import finite_spread
 from wirebayes.numeric.typing import Array
 from wirebayes.result_warnings import Notice
 from wirebayes.results import hold_ends

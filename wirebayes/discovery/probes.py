@@ -7,7 +7,7 @@ import numpy as np
 
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model.sample import Sample
-from wirebayes.numeric.distributions import finite_spread
+from wirebayes.numeric.any_distribution import finite_spread
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.model import Model

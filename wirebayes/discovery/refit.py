@@ -16,7 +16,7 @@ from wirebayes.discovery.profile import Profile, has_near_neighbours, integral_o
 from wirebayes.discovery.sharing import alike
 from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
 from wirebayes.inference.optimum import Optimum
-from wirebayes.numeric.distributions import finite_spread
+from wirebayes.numeric.any_distribution import finite_spread
 from wirebayes.numeric.typing import Array, Function, Ints
 from wirebayes.wire.effect import Effect
 

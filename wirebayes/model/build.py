@@ -14,7 +14,8 @@ from wirebayes.model.problem import Problem
 from wirebayes.model.sample import LENGTH_EXPONENT, MATERIAL, SAMPLE, Sample
 from wirebayes.model.scales import Scales, Units, scales_of
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
-from wirebayes.numeric.distributions import LogUniform, ours, scaled
+from wirebayes.numeric.any_distribution import ours, scaled
+from wirebayes.numeric.distributions import LogUniform
 from wirebayes.numeric.means import geometric_mean
 from wirebayes.strict.hint import hint
 from wirebayes.wire.control import READ_UNIT, SET_UNIT

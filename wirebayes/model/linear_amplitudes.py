@@ -17,7 +17,8 @@ from wirebayes.model.hold_filter import Measured
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Sample
 from wirebayes.numeric import linear_algebra
-from wirebayes.numeric.distributions import Normal, ours
+from wirebayes.numeric.any_distribution import ours
+from wirebayes.numeric.distributions import Normal
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.staircase import Linearised, simulate

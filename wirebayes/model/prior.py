@@ -37,6 +37,7 @@ from scipy.special import logit
 
 from wirebayes.errors import InputError, shown
 from wirebayes.model.scales import Scales
+from wirebayes.numeric.any_distribution import log_density_of, ours
 from wirebayes.numeric.distributions import (
     HalfNormal,
     LogitNormal,
@@ -44,9 +45,7 @@ from wirebayes.numeric.distributions import (
     Normal,
     TruncatedNormal,
     Uniform,
-    log_density_of,
     log_normal,
-    ours,
 )
 from wirebayes.numeric.typing import Array, Function
 from wirebayes.wire.protocol import Control

@@ -17,7 +17,7 @@ from wirebayes.model.hold_filter import Measured
 from wirebayes.model.prior import PowerScaled, Prior
 from wirebayes.model.sample import LENGTH_EXPONENT, Likelihood, Sample, at_length
 from wirebayes.model.scales import NATURAL, Scales, Units
-from wirebayes.numeric.distributions import scaled
+from wirebayes.numeric.any_distribution import scaled
 from wirebayes.numeric.log_sum import or_impossible
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.control import READ_UNIT

@@ -18,7 +18,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.plan import EffectPower
 from wirebayes.model.build import build
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
-from wirebayes.numeric.distributions import finite_spread
+from wirebayes.numeric.any_distribution import finite_spread
 from wirebayes.planning.widths import Guess, central
 from wirebayes.wire.effect import Effect, Kinds
 

@@ -17,7 +17,7 @@ from wirebayes.json_files.summary import CreepBand, ExtrapolatedCreep, Identifia
 from wirebayes.model.column_units import unit_of_column
 from wirebayes.model.prior import Prior
 from wirebayes.model.problem import Problem
-from wirebayes.numeric.distributions import log_density_of
+from wirebayes.numeric.any_distribution import log_density_of
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Array
 from wirebayes.results.contraction import contraction, source

@@ -9,7 +9,8 @@ import numpy as np
 from wirebayes.model.column_units import parameter_of
 from wirebayes.model.prior import Prior
 from wirebayes.model.sample import NOISES, SAMPLE
-from wirebayes.numeric.distributions import HalfCauchy, HalfNormal, LogitNormal, LogNormal, Normal, log_density_of, ours
+from wirebayes.numeric.any_distribution import log_density_of, ours
+from wirebayes.numeric.distributions import HalfCauchy, HalfNormal, LogitNormal, LogNormal, Normal
 from wirebayes.numeric.typing import Array
 from wirebayes.result_warnings import Notice
 from wirebayes.sentences import listed

@@ -8,7 +8,8 @@ import numpy as np
 
 from wirebayes.inference.coordinates.edges import Edge, edge
 from wirebayes.model.problem import Problem
-from wirebayes.numeric.distributions import ONE_SD, LogitNormal, finite_spread
+from wirebayes.numeric.any_distribution import finite_spread
+from wirebayes.numeric.distributions import ONE_SD, LogitNormal
 from wirebayes.numeric.typing import Array, Bools, Ints
 
 

@@ -6,15 +6,8 @@ from typing import Any
 import numpy as np
 from scipy.special import erf, erfc, erfcinv, erfinv, ndtr, ndtri
 
-from wirebayes.numeric.distributions import (
-    HalfCauchy,
-    HalfNormal,
-    LogUniform,
-    Normal,
-    TruncatedNormal,
-    Uniform,
-    ours,
-)
+from wirebayes.numeric.any_distribution import ours
+from wirebayes.numeric.distributions import HalfCauchy, HalfNormal, LogUniform, Normal, TruncatedNormal, Uniform
 from wirebayes.numeric.typing import Array, Function
 
 _NEAREST = 1e-9  # share of the prior between an edge and a value on it, whose score would be infinite
