@@ -14,7 +14,7 @@ from wirebayes.progress import silent
 from wirebayes.robot.mechanics import draws
 from wirebayes.robot.mechanics.rotation import vector
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration import search, session_file
+from wirebayes.robot.self_calibration import answer, search, session_file
 from wirebayes.robot.self_calibration.answer import _Verdict, calibration_report
 from wirebayes.robot.self_calibration.equations import Holds
 from wirebayes.robot.self_calibration.predicted import predict_session
@@ -84,6 +84,24 @@ def test_the_verdict_turns_at_its_threshold():
     astray = replace(search, found=replace_in(found, converged=False), p=1.0)
     assert not _Verdict(astray, seen, []).usable
     assert not _Verdict(replace(search, p=1.0), SimpleNamespace(determined=0, of=4), []).usable
+
+
+@pytest.mark.parametrize(("times", "said"), [(2.99, False), (3.01, True)])
+def test_poses_without_which_joint_values_agree_better_are_asked_for(monkeypatch, times, said):
+    for check in ("odd_hold", "sag_warnings_of_poses"):
+        monkeypatch.setattr(answer, check, lambda *arguments: [])
+    robot, _, session, _ = _session(0)
+    state = SimpleNamespace(position_m=session.position_m, rotation=session.rotation, pull_N=None)
+    noise = SimpleNamespace(joint_m=0.7e-3, balance=0.0)
+    found = SimpleNamespace(converged=True, noise=noise, unknowns=SimpleNamespace(robot=robot), state=state)
+    holds = SimpleNamespace(session=session)
+    seen = SimpleNamespace(determined=4, of=4)
+    looked = Searched(found, holds, 0.5, None, inexact=False, requested=False, closer=times)
+    notices = answer._warnings(_Verdict(looked, seen, []))
+    asked = [one for one in notices if "--pose-sd" in one.text]
+    assert [one.kind for one in asked] == ["data"] * said
+    if said:
+        assert "to 0.7 mm, and to 0.23 mm if the poses are unknown" in asked[0].text
 
 
 def replace_in(namespace, **changed):

@@ -14,6 +14,7 @@ from wirebayes.progress import silent
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.self_calibration import descent, estimate, search, summary
 from wirebayes.robot.self_calibration.equations import Holds, State
+from wirebayes.robot.self_calibration.unknowns import StatedErrors
 
 
 def test_rows_without_a_pose_and_unknown_anchors_are_estimated(fitted, session_csv, tmp_path):  # noqa: F811
@@ -161,3 +162,22 @@ def test_an_answer_is_not_given_up_for_a_search_without_one(monkeypatch, found, 
     answer = search._rather_requests(given, holds, True, True, silent)
     assert answer[0] is (blind if requested else given)
     assert answer[2] is requested
+
+
+def test_poses_that_are_kept_say_how_much_nearer_the_joint_values_are_without_them(monkeypatch):
+    state = State(np.zeros(2), np.zeros((1, 3)), np.eye(3)[None], np.ones((1, 4)))
+    session = SimpleNamespace(position_m=np.zeros((1, 3)), without_poses=lambda: "blind")
+    holds = Holds(session, np.ones((1, 4)))
+    unknowns = SimpleNamespace(errors=StatedErrors(joint_m=None))
+    given, blind = (
+        SimpleNamespace(unknowns=unknowns, state=state, converged=True, noise=SimpleNamespace(joint_m=joint_m))
+        for joint_m in (0.7e-3, 0.2e-3)
+    )
+    monkeypatch.setattr(search, "estimate", lambda *arguments: blind)
+    for rule in ("_steadier", "_closer"):
+        monkeypatch.setattr(search, rule, lambda *arguments: False)
+    answer = search._rather_requests(given, holds, False, True, silent)
+    assert answer.found is given and not answer.requested
+    assert answer.closer == pytest.approx(3.5)
+    undoubted = search._rather_requests(given, holds, False, False, silent)
+    assert undoubted.closer == 1.0

@@ -34,7 +34,7 @@ from wirebayes.robot.self_calibration.next_poses import NextPoses, next_poses
 from wirebayes.robot.self_calibration.open_where import contradicted_requests, most_open, odd_hold
 from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.residuals import contradicted, length_rms_m, lost, misfit, trust
-from wirebayes.robot.self_calibration.search import Searched, StatedPoses, searched
+from wirebayes.robot.self_calibration.search import RATHER, Searched, StatedPoses, searched
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import Summary, summarised
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, chance, interval_about, unlearnt, unlikely
@@ -309,6 +309,8 @@ def _warnings(verdict: _Verdict) -> list[Notice]:
             "taken for requests, and the poses as unknown; give --pose-sd if they were measured"
         )
         out.append(Notice("data", text))
+    if found.converged and search.closer > RATHER:
+        out.append(Notice("data", _perhaps_requests(search)))
     if search.too_near:
         text = (
             "geometry and references are found nearer to the robot's file than their stated errors allow: the file "
@@ -329,6 +331,17 @@ def _warnings(verdict: _Verdict) -> list[Notice]:
         )
         out.append(Notice("misfit", text))
     return out
+
+
+def _perhaps_requests(search: Searched) -> str:
+    """What to do where the stated poses may be commands, though readings are too few to be sure."""
+    with_poses = 1e3 * search.found.noise.joint_m
+    without = with_poses / search.closer
+    return (
+        f"the joint values agree with the stated poses to {short(with_poses, 2)} mm, and to {short(without, 2)} mm if "
+        "the poses are unknown: were they measured? If the robot was only sent there, leave them empty; if they were "
+        "measured, say how well with --pose-sd"
+    )
 
 
 def _inexact(search: Searched) -> str:

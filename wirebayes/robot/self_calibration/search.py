@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import chdtr, fdtrc
@@ -16,7 +17,7 @@ from wirebayes.robot.self_calibration.sensors import Suspects, suspects
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 
-_RATHER = 3.0  # times smaller errors of loops or balance, before stated poses are taken for requests
+RATHER = 3.0  # times smaller errors of loops or balance, before stated poses are taken for requests
 _WELL, _CHANCE = 0.1, 1e-4  # of the standard deviation before; of estimates that near to their prior's mean
 _GROSS = 1e4  # mean squared residual: of readings that are a hundred standard errors off no joint value is the reason
 _NO_DEGREES = 1e-9  # of freedom: what loops that always close are left with
@@ -51,6 +52,8 @@ class Searched:
     too_near : bool
         Estimates lie nearer to the robot's file than its stated errors allow, and without the stated poses there is
         no answer.
+    closer : float
+        Without the stated poses, which were kept, errors of joint values would be so many times smaller.
     """
 
     found: RobotPosterior
@@ -60,6 +63,7 @@ class Searched:
     inexact: bool
     requested: bool
     too_near: bool = False
+    closer: float = 1.0
 
 
 def searched(
@@ -87,7 +91,7 @@ def searched(
     found = best(unknowns, holds, rng, progress, about=about)
     too_good = bool(holds.placed.any()) and _too_good(found)
     doubted = poses is StatedPoses.EITHER
-    found, holds, requested = _rather_requests(found, holds, too_good, doubted, progress)
+    found, holds, requested, closer = _rather_requests(found, holds, too_good, doubted, progress)
     p = trust(found)
     at_fault = _sensor_at_fault(found, holds, p, progress)
     inexact = unknowns.errors.joint_m == 0 and not (found.converged and p >= SIGNIFICANT)
@@ -98,7 +102,7 @@ def searched(
         if other.converged or not found.converged:
             found = other
     too_near = too_good and not requested
-    return Searched(found, holds, p, at_fault, inexact, requested, too_near)
+    return Searched(found, holds, p, at_fault, inexact, requested, too_near, closer)
 
 
 def _sensor_at_fault(found: RobotPosterior, holds: Holds, p: float, progress: Progress) -> Suspects | None:
@@ -111,24 +115,34 @@ def _sensor_at_fault(found: RobotPosterior, holds: Holds, p: float, progress: Pr
 
 def _rather_requests(
     found: RobotPosterior, holds: Holds, too_good: bool, doubted: bool, progress: Progress
-) -> tuple[RobotPosterior, Holds, bool]:
+) -> "_Chosen":
     """What is found without the poses, where they are commands or contradict the joint values: they were requests.
 
     An answer is not given up for a search that found none.
     """
+    kept = _Chosen(found, holds)
     if not holds.placed.any():
-        return found, holds, False
+        return kept
     if not too_good and not (doubted and found.unknowns.errors.pose_m == 0):
-        return found, holds, False
+        return kept
     blind = _without_poses(holds)
     state = replace(found.state, white=np.zeros_like(found.state.white))
     other = estimate(found.unknowns, blind, state, progress_of(progress, "poses as requests"))
     if found.converged and not other.converged:
-        return found, holds, False
+        return kept
     better = _steadier(found, other) or _closer(found, other, holds)
     if too_good or (other.converged and better and trust(other) >= SIGNIFICANT):
-        return other, blind, True
-    return found, holds, False
+        return _Chosen(other, blind, requested=True)
+    return kept._replace(closer=found.noise.joint_m / other.noise.joint_m)
+
+
+class _Chosen(NamedTuple):
+    """What was found with the stated poses or without them, as `Searched` has it."""
+
+    found: RobotPosterior
+    holds: Holds
+    requested: bool = False
+    closer: float = 1.0
 
 
 def _without_poses(holds: Holds) -> Holds:
@@ -137,7 +151,7 @@ def _without_poses(holds: Holds) -> Holds:
 
 def _steadier(found: RobotPosterior, other: RobotPosterior) -> bool:
     """Whether tensions balance without the stated poses, and not with them."""
-    return found.noise.balance > max(_UNSEEN, _RATHER * other.noise.balance)
+    return found.noise.balance > max(_UNSEEN, RATHER * other.noise.balance)
 
 
 def _closer(found: RobotPosterior, other: RobotPosterior, holds: Holds) -> bool:
@@ -146,7 +160,7 @@ def _closer(found: RobotPosterior, other: RobotPosterior, holds: Holds) -> bool:
     Poses that are unknown close every loop of a robot that has no wires to spare: such loops say nothing.
     """
     times = found.noise.joint_m / other.noise.joint_m
-    if not times > _RATHER:
+    if not times > RATHER:
         return False
     _, worth = usual_joint(found.unknowns.robot, holds)
     with_poses, without = (max(one.degrees - worth, _NO_DEGREES) for one in (found, other))
