@@ -203,7 +203,7 @@ def coverage(size: int, seed: int) -> Iterator[dict[str, Any]]:
     for asked, one in _cases(size, rng, of, True):
         begun = time.process_time()
         with np.errstate(all="ignore"):
-            found = best(one.told, one.holds, rng)
+            found = best(one.told, one.holds, rng.spawn(1)[0])
         row = {"kind": asked.kind, "mode": asked.mode, "anchor": asked.anchor, "seconds": time.process_time() - begun}
         yield row | {"converged": bool(found.converged), "usable": bool(_verdict(found))} | _held(found, one)
 
@@ -316,7 +316,7 @@ def lengths(size: int, seed: int) -> Iterator[dict[str, Any]]:
     for asked, one in _cases(size, rng, of, False):
         begun = time.process_time()
         with np.errstate(all="ignore"):
-            found = best(one.told, one.holds, rng)
+            found = best(one.told, one.holds, rng.spawn(1)[0])
         s = summarised(found)
         after, before = _between(s.exit_m.mean, one.exit_m), _between(one.told.robot.exit_m, one.exit_m)
         yield {
@@ -352,7 +352,7 @@ def marks(size: int, seed: int) -> Iterator[dict[str, Any]]:
     for asked, one in _cases(size, rng, of, False):
         begun = time.process_time()
         with np.errstate(all="ignore"):
-            found = best(one.told, one.holds, rng)
+            found = best(one.told, one.holds, rng.spawn(1)[0])
         yield {
             "kind": asked.kind,
             "mode": asked.mode,
