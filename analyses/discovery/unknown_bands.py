@@ -31,7 +31,7 @@ DRAWS = 2000  # of a bootstrap
 
 @cache
 def candidates(seed: int) -> list[Spec]:
-    """The benchmark's files of a seed, each protocol and effect in turn."""
+    """The benchmark's files of a seed, in a random order that the seed determines."""
     every = specs(SIZES["full"], seed, ("single", "foreign"), PROTOCOLS)
     wanted = [spec for spec in every if spec.delta in DELTAS]
     order = np.random.default_rng(seed).permutation(len(wanted))

@@ -315,8 +315,8 @@ def with_discrepancy(block: LaplaceFit, experiment: Experiment, rng: Generator) 
     fit = block
     if not same or own != block.effects:
         fit = fitted([experiment], own, block.spec, rng, scales=block.scales)
-    size_N = residual_rms(fit, experiment.name)
-    return (*own, discrepancy(experiment, size_N))
+    size = residual_rms(fit, experiment.name)
+    return (*own, discrepancy(experiment, size))
 
 
 def acting_alone(effects: Sequence[Effect], experiment: Experiment) -> tuple[Effect, ...]:

@@ -62,11 +62,15 @@ class Discrepancy(Effect):
         bend = _SHARE * self.size / _size_of_curves()
         steps = {f"{walk}{k}": step for walk in ("level", "course") for k in range(2 * KNOTS)}
         bends = {f"{curve}{k}": bend for curve in ("order", "setting") for k in range(len(_BENDS))}
-        sds = steps | bends
-        return tuple(Amplitude(name, "N", 0.0, Normal(0.0, sd), in_natural_units=True) for name, sd in sds.items())
+        out = []
+        for name, sd in (steps | bends).items():
+            prior = Normal(0.0, sd)
+            out.append(Amplitude(name, "N", 0.0, prior, in_natural_units=True))
+        return tuple(out)
 
     def in_units(self, set_: float, read: float, time: float) -> "Discrepancy":
-        least, range_ = self.least * set_, self.range_ * set_
+        least = self.least * set_
+        range_ = self.range_ * set_
         return replace(self, size=self.size * read, hold_s=self.hold_s * time, least=least, range_=range_)
 
     def apply(self, value: Array, own: dict[str, Array], hold: HoldContext) -> Array:

@@ -181,7 +181,8 @@ def _accelerations(times_s: Floats, position_m: Floats) -> Floats:
     change = np.linalg.norm(np.diff(velocity, axis=0), axis=1)
     through = change / (0.5 * (step[1:] + step[:-1]))
     speed = np.linalg.norm(velocity, axis=1)
-    still = np.r_[False, speed[:-1] <= _STILL * speed[1:]], np.r_[speed[1:] <= _STILL * speed[:-1], False]
-    ends_at_rest = still[0].astype(int) + still[1].astype(int)
+    is_still_before = np.r_[False, speed[:-1] <= _STILL * speed[1:]]
+    is_still_after = np.r_[speed[1:] <= _STILL * speed[:-1], False]
+    ends_at_rest = is_still_before.astype(int) + is_still_after.astype(int)
     within = 2.0 * ends_at_rest * speed / step  # from rest to rest: to twice the mean speed in half the time
     return np.fmax(through, np.fmax(within[:-1], within[1:]))

@@ -60,7 +60,8 @@ def _creep_strain(robot: Robot, line: WireDraws, tension_N: Floats, time_s: floa
 
 def _whose(robot: Robot, line: WireDraws, leg: int) -> tuple[str, str]:
     """Where the parameters of a leg's wire stand, and what to look at."""
-    name, wire = robot.wire[leg], draws.lines_of(robot, line)[leg].centre()
+    name = robot.wire[leg]
+    wire = draws.lines_of(robot, line)[leg].centre()
     values = f"B = {short(wire.parameters['B'][0], 4)} mm at a length of {short(wire.length_mm, 4)} mm"
     if name in robot.given:
         return f"{robot.name}, [wires.{name}], {values}", "are the units those of the keys?"

@@ -113,9 +113,16 @@ def _sensor_at_fault(found: RobotPosterior, holds: Holds, p: float, progress: Pr
     return suspects(found, holds, progress_of(progress, "sensors"))
 
 
-def _rather_requests(
-    found: RobotPosterior, holds: Holds, too_good: bool, doubted: bool, progress: Progress
-) -> "_Chosen":
+class _Chosen(NamedTuple):
+    """What was found with the stated poses or without them, as `Searched` has it."""
+
+    found: RobotPosterior
+    holds: Holds
+    requested: bool = False
+    closer: float = 1.0
+
+
+def _rather_requests(found: RobotPosterior, holds: Holds, too_good: bool, doubted: bool, progress: Progress) -> _Chosen:
     """What is found without the poses, where they are commands or contradict the joint values: they were requests.
 
     An answer is not given up for a search that found none.
@@ -134,15 +141,6 @@ def _rather_requests(
     if too_good or (other.converged and better and trust(other) >= SIGNIFICANT):
         return _Chosen(other, blind, requested=True)
     return kept._replace(closer=found.noise.joint_m / other.noise.joint_m)
-
-
-class _Chosen(NamedTuple):
-    """What was found with the stated poses or without them, as `Searched` has it."""
-
-    found: RobotPosterior
-    holds: Holds
-    requested: bool = False
-    closer: float = 1.0
 
 
 def _without_poses(holds: Holds) -> Holds:
