@@ -103,3 +103,14 @@ def test_a_wrong_prior_is_refused_before_anything_is_written(command, start, tmp
     assert main([command, str(wrong), "--output", str(tmp_path / "out")]) == 2
     assert "k9" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("command", ["check", "fit", "discover", "compare", "batch", "plan"])
+def test_every_command_refuses_a_prior_of_a_misspelt_effect(command, start, tmp_path, capsys):
+    (tmp_path / "my-wire.csv").write_bytes(start.with_suffix(".csv").read_bytes())
+    path = tmp_path / "my-wire.toml"
+    path.write_text("[prior.toes.w]\nfixed = 0.1\n\n" + start.read_text())
+    assert main([command, str(path), "--output", str(tmp_path / "out")]) == 2
+    found = f"{path}, line 1: prior.toes.w: found no such parameter (did you mean toe.w?), expected"
+    assert found in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

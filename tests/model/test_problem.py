@@ -1,7 +1,6 @@
 """The likelihood of whole experiments against dense normals: rounding, and samples of one material at two lengths."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from tests.model.dense import columns, log_density, normal
 from tests.simulated import simulated_tests
 from wirebayes.effects import effect_named
 from wirebayes.effects.event import GripSlip
-from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import single_holds
 from wirebayes.model.build import build
@@ -160,25 +158,6 @@ def test_priors_of_the_file_replace_those_of_the_most_specific_name() -> None:
     assert problem.prior.fixed == {"k1[line]": 5.0, "preload[a]": 0.2, "creep_length_exponent[line]": 0.5}
     # one test has no other name for its own; of one length no exponent is needed, and a table for it is no error
     assert build([short("a", priors=tables)]).prior.fixed == {"k1": 5.0, "preload": 0.2}
-
-
-def test_a_prior_of_an_amplitude_that_an_effect_has_not_is_refused() -> None:
-    """In silence it would count for nothing; an effect that the catalogue does not know may be a user's own."""
-    wrong = short(priors={"toe.c": {"fixed": 1.0}}, source=Path("e.toml"))
-    with pytest.raises(InputError, match=r"e\.toml: prior\.toe\.c: found no amplitude c of toe, expected toe\.w"):
-        build([wrong])
-    assert build([short(priors={"toe.w": {"fixed": 1.0}, "own.c": {"fixed": 1.0}, "toe@strain.c": {"fixed": 1.0}})])
-
-
-@pytest.mark.parametrize(("lines", "where"), [({}, "e.toml: prior.k3"), ({"k3": 7}, "e.toml, line 7: prior.k3")])
-def test_a_prior_of_no_parameter_is_refused_with_its_place(lines: dict[str, int], where: str) -> None:
-    wrong = short(priors={"k3": {"fixed": 1.0}}, prior_lines=lines, source=Path("e.toml"))
-    with pytest.raises(InputError) as error:
-        build([wrong])
-    assert str(error.value).startswith(f"{where}: found no such parameter")
-    assert str(error.value).endswith(
-        "expected one of B, N, U, creep_length_exponent, k1, k2, preload, sensor_sd, setting_sd, or effect.parameter"
-    )
 
 
 def test_data_without_noise_have_a_floor() -> None:

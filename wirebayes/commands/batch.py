@@ -14,6 +14,7 @@ from typing import Any
 from wirebayes._version import __version__
 from wirebayes.commands.one_experiment import QUANTITIES, BatchTask, Done, do, empty_row, first_columns, packed
 from wirebayes.commands.options import (
+    check_priors,
     check_seed,
     check_train_holds,
     data_of,
@@ -31,7 +32,6 @@ from wirebayes.io.experiment import Experiment, folder_key
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.run_folder import check_run, open_run, read_json, write_bytes, write_csv, write_json, write_parquet
 from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
-from wirebayes.model.build import build
 from wirebayes.model.sample import MATERIAL, SAMPLE
 from wirebayes.processes.workers import as_finished, computing, executor
 from wirebayes.progress import Progress, silent
@@ -40,6 +40,7 @@ from wirebayes.results.outliers import outliers
 from wirebayes.strict.files import PathLike
 from wirebayes.views.batch import Batch
 from wirebayes.views.result import ResultFolder
+from wirebayes.wire.effect import Kinds
 from wirebayes.wire.laws import ElasticLaw, History
 
 TABLE, PARQUET = "summary.csv", "summary.parquet"
@@ -132,7 +133,7 @@ def batch(
     own = path_of(own_effects)
     left_out = names_given(without)
     catalogue_without(left_out, catalogue(own))
-    read, unreadable = _read(sources, train_holds, keep_going)
+    read, unreadable = _read(sources, catalogue(own), train_holds, keep_going)
     experiments = [experiment for experiment, _ in read]
     effort = policy or DEFAULT
     checked = simulations or SIMULATIONS
@@ -167,7 +168,9 @@ def batch(
     return Batch(place, own)
 
 
-def _read(sources: Sources, train_holds: int | None, keep_going: bool) -> tuple[list[_WithFile], dict[str, str]]:
+def _read(
+    sources: Sources, kinds: Kinds, train_holds: int | None, keep_going: bool
+) -> tuple[list[_WithFile], dict[str, str]]:
     """Every experiment with the file it came from, and what is wrong with the files that cannot be read."""
     given = [sources] if isinstance(sources, str | os.PathLike | Experiment) else list(sources)
     read: list[_WithFile] = []
@@ -180,7 +183,7 @@ def _read(sources: Sources, train_holds: int | None, keep_going: bool) -> tuple[
         else:
             raise InputError(f"sources: found {type(source).__name__}, expected paths of files or Experiments")
         try:
-            found = _experiments(source, train_holds)
+            found = _experiments(source, kinds, train_holds)
         except InputError as error:
             wrong[file] = str(error)
             continue
@@ -196,13 +199,13 @@ def _read(sources: Sources, train_holds: int | None, keep_going: bool) -> tuple[
     return _distinct(read), wrong
 
 
-def _experiments(source: PathLike | Experiment, train_holds: int | None) -> list[Experiment]:
+def _experiments(source: PathLike | Experiment, kinds: Kinds, train_holds: int | None) -> list[Experiment]:
     """The experiments of a file, checked."""
     found = [source] if isinstance(source, Experiment) else read_experiments(Path(source))
     if train_holds is not None:
         found = [experiment.first(train_holds) for experiment in found]
     for experiment in found:
-        build([experiment])  # checks priors
+        check_priors([experiment], kinds)
     return found
 
 

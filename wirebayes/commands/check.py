@@ -3,7 +3,7 @@
 import numpy as np
 
 from wirebayes._version import __version__
-from wirebayes.commands.options import Source, check_seed, data_of, experiments_of, path_of
+from wirebayes.commands.options import Source, check_priors, check_seed, data_of, experiments_of, path_of
 from wirebayes.discovery.preview import preview
 from wirebayes.effects import catalogue, source_of
 from wirebayes.inference.fit import seed_of
@@ -13,7 +13,6 @@ from wirebayes.io.readings import Hold
 from wirebayes.io.run_folder import open_run, write_json
 from wirebayes.json_files.check import CheckedExperiment, CheckJson, HoldUnderstood, Understood
 from wirebayes.json_files.read_units import in_unit
-from wirebayes.model.build import build
 from wirebayes.processes.workers import computing
 from wirebayes.progress import Progress, silent
 from wirebayes.result_warnings import notices_by_part, to_json
@@ -83,7 +82,7 @@ def check(
     experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
     kinds = catalogue(own)
     for one in experiments:
-        build([one])  # checks priors
+        check_priors([one], kinds)
     configuration = {
         "command": "check",
         "version": __version__,

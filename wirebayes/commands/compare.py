@@ -8,6 +8,7 @@ from typing import Any
 from wirebayes._version import __version__
 from wirebayes.commands.options import (
     Source,
+    check_priors,
     check_seed,
     check_train_holds,
     data_of,
@@ -17,7 +18,7 @@ from wirebayes.commands.options import (
     other_effort,
     path_of,
 )
-from wirebayes.comparison.candidates import BASE, ModelToCompare, candidates, problem_of
+from wirebayes.comparison.candidates import BASE, ModelToCompare, candidates
 from wirebayes.comparison.compare import POLICY, Task, judge_all, side_by_side
 from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
@@ -182,7 +183,7 @@ def plan_comparison(
     models = {}
     for one in experiments:
         _check_holds(one, train_holds)
-        problem_of(base, one, [])  # checks the file's priors
+        check_priors([one], known, spec=spec)
         chosen = _chosen(one, base, known, names)
         tasks += [Task(one, candidate, train_holds, own) for candidate in chosen]
         models[one.name] = [candidate.name for candidate in chosen]

@@ -7,6 +7,7 @@ from pathlib import Path
 from wirebayes._version import __version__
 from wirebayes.commands.options import (
     Source,
+    check_priors,
     check_seed,
     check_train_holds,
     data_of,
@@ -26,7 +27,6 @@ from wirebayes.io.next_hold import write_next_hold
 from wirebayes.io.run_folder import open_run, read_json, write_bytes, write_json
 from wirebayes.json_files.discovery import IntervalJson, ParameterReport
 from wirebayes.json_files.summary import Parameter, SummaryJson
-from wirebayes.model.build import build
 from wirebayes.model.spec import ModelSpec
 from wirebayes.processes.copies import loaded_meanwhile, prepared_copy
 from wirebayes.processes.workers import computing, give_way, workers
@@ -113,8 +113,9 @@ def discover(
     own = path_of(own_effects)
     left_out = names_given(without)
     experiments = experiments_of(source, experiment, train_holds=train_holds, drop_breaks=drop_breaks)
-    kinds = catalogue_without(left_out, catalogue(own))
-    build(experiments, (), spec)  # checks priors
+    known = catalogue(own)
+    kinds = catalogue_without(left_out, known)
+    check_priors(experiments, known, spec=spec)
     configuration = {
         "command": "discover",
         "version": __version__,

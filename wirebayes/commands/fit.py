@@ -10,6 +10,7 @@ from unicodedata import normalize
 from wirebayes._version import __version__
 from wirebayes.commands.options import (
     Source,
+    check_priors,
     check_seed,
     check_train_holds,
     data_of,
@@ -26,7 +27,6 @@ from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.next_hold import write_next_holds
 from wirebayes.io.run_folder import open_run
-from wirebayes.model.build import build
 from wirebayes.model.sample import Likelihood
 from wirebayes.numeric.distributions import Normal
 from wirebayes.processes.workers import computing, workers
@@ -134,7 +134,7 @@ def fit(
     for folder, members in groups.items():
         for effect in added:
             _check_possible(effect, members, file, known, history)
-        build(members, added, spec)  # checks priors
+        check_priors(members, known, added, spec)
         jobs.append(Job(folder, members, keys, own, spec, _provenance(members, file)))
         fitted += members
     configuration = {

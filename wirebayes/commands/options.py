@@ -12,10 +12,13 @@ from wirebayes.inference.policy import Policy
 from wirebayes.io import gross_events
 from wirebayes.io.experiment import ENOUGH, Experiment, enough, folder_key, holds_and_readings
 from wirebayes.io.experiment_file import SAME_FOLDER, read_experiments, select
+from wirebayes.model.build import build
+from wirebayes.model.prior_names import check_prior_names
 from wirebayes.model.sample import Likelihood
-from wirebayes.model.spec import ModelSpec
+from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.strict.files import PathLike
 from wirebayes.strict.hint import hint
+from wirebayes.wire.effect import Effect, Kinds
 from wirebayes.wire.laws import ElasticLaw, History
 
 Source = PathLike | Experiment | Sequence[Experiment]
@@ -66,6 +69,30 @@ def data_of(experiments: Iterable[Experiment]) -> dict[str, dict[str, Any]]:
         "priors": {e.name: e.priors for e in experiments},
         "data_sha256": {e.name: e.data_hash for e in experiments},
     }
+
+
+def check_priors(
+    experiments: Sequence[Experiment], kinds: Kinds, effects: Sequence[Effect] = (), spec: ModelSpec = PLAIN_SPEC
+) -> None:
+    """Refuse priors of a file that are malformed, or name nothing.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+        Of one fit.
+    kinds : mapping of name to Effect
+        All effects that a model may have: a prior may be of one that this fit has not.
+    effects : sequence of Effect
+        Those that this fit has.
+    spec : ModelSpec
+
+    Raises
+    ------
+    InputError
+        With file, line and key.
+    """
+    check_prior_names(experiments, kinds)
+    build(experiments, effects, spec)
 
 
 def other_effort(policy: Policy | None, simulations: int | None = None) -> dict[str, Any]:

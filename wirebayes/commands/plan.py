@@ -10,7 +10,7 @@ import numpy as np
 from numpy.random import Generator
 
 from wirebayes._version import __version__
-from wirebayes.commands.options import above_zero, check_seed, model_spec, path_of
+from wirebayes.commands.options import above_zero, check_priors, check_seed, model_spec, path_of
 from wirebayes.commands.plan_content import PlanRequest, plan_content, protocol_content
 from wirebayes.commands.predict import find_posterior
 from wirebayes.commands.wires import RobotLike, hash_of, identity_of, robot_of
@@ -25,7 +25,6 @@ from wirebayes.io.readings import Hold
 from wirebayes.io.run_folder import open_run, read_json, write_json
 from wirebayes.json_files.discovery import DiscoveryJson
 from wirebayes.json_files.plain import plain
-from wirebayes.model.build import build
 from wirebayes.model.sample import Sample
 from wirebayes.model.spec import ModelSpec
 from wirebayes.numeric.frozen import frozen
@@ -119,7 +118,7 @@ def plan(
         above_zero(("--budget-min", budget_min))
     kinds = catalogue(own)
     rng = np.random.default_rng(seed_of(seed, "guess"))
-    request = _request(source, experiment, tests, list(kinds), spec, own, rng)
+    request = _request(source, experiment, tests, kinds, spec, own, rng)
     if aim is not None:
         request = replace(request, aim=_checked_aim(aim, list(kinds)))
     if budget_min is not None:
@@ -198,42 +197,42 @@ def _request(
     source: PathLike | Experiment,
     name: str | None,
     n: int,
-    effects: list[str],
+    kinds: Kinds,
     spec: ModelSpec,
     own: Path | None,
     rng: Generator,
 ) -> PlanRequest:
     """Tests and guess of whatever was given."""
     if isinstance(source, Experiment):
-        return _of_experiment(source, n, spec, rng)
+        return _of_experiment(source, n, kinds, spec, rng)
     if not isinstance(source, str | os.PathLike):
         raise InputError(f"source: found {type(source).__name__}, expected a path or an Experiment")
     path = Path(source)
     if path.is_dir():
-        return _of_folder(path, name, n, effects, own)
+        return _of_folder(path, name, n, kinds, own)
     if is_plan(path):
-        written = read_plan(path, effects)
-        return _of_plan(written, name, n, own, rng)
+        written = read_plan(path, list(kinds))
+        return _of_plan(written, name, n, kinds, own, rng)
     read = read_experiments(path)
     first, *others = select(read, name)
     if others:
         names = ", ".join(experiment.name for experiment in (first, *others))
         raise InputError(f"{source}: found the experiments {names}, expected one of them as --experiment")
-    return _of_experiment(first, n, spec, rng)
+    return _of_experiment(first, n, kinds, spec, rng)
 
 
-def _of_experiment(measured: Experiment, n: int, spec: ModelSpec, rng: Generator) -> PlanRequest:
+def _of_experiment(measured: Experiment, n: int, kinds: Kinds, spec: ModelSpec, rng: Generator) -> PlanRequest:
     """The same test again, and others like it."""
-    build([measured], (), spec)  # checks priors
+    check_priors([measured], kinds, spec=spec)
     guess = from_readings(measured, n, rng, spec)
     about = {"data_sha256": measured.data_hash, "priors": measured.priors}
     return PlanRequest(_like(measured), guess, ("parameters",), None, None, about)
 
 
-def _of_plan(file: PlanFile, name: str | None, n: int, own: Path | None, rng: Generator) -> PlanRequest:
+def _of_plan(file: PlanFile, name: str | None, n: int, kinds: Kinds, own: Path | None, rng: Generator) -> PlanRequest:
     planned = [_experiment(test, file) for test in file.tests]
     for test in planned:
-        build([test])  # checks priors
+        check_priors([test], kinds)
     about: dict[str, Any] = {}
     if file.posterior is None:
         guess = from_tables(file.guess, file.guess_lines, file.source, planned, n, rng)
@@ -247,10 +246,10 @@ def _of_plan(file: PlanFile, name: str | None, n: int, own: Path | None, rng: Ge
     return PlanRequest(tests, guess, file.aim, file.budget_min, file.robot, about)
 
 
-def _of_folder(folder: Path, name: str | None, n: int, effects: list[str], own: Path | None) -> PlanRequest:
+def _of_folder(folder: Path, name: str | None, n: int, kinds: Kinds, own: Path | None) -> PlanRequest:
     """The folder of a fit or discover: the same test again, and others like it."""
     guess, about, sample = _posterior(folder, name, n, own)
-    rivals = [effect for effect in _rivals(folder / "discovery.json", sample.name) if effect in effects]
+    rivals = [effect for effect in _rivals(folder / "discovery.json", sample.name) if effect in kinds]
     aim = tuple(rivals[:2]) if len(rivals) > 1 else ("parameters",)
     return PlanRequest(_like(_measured(sample, folder)), guess, aim, None, None, about)
 

@@ -5,11 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.effects import CATALOGUE
-from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment, by_material
 from wirebayes.model.column_units import parameter_of, unit_of_column
 from wirebayes.model.prior import PowerScaled, Prior, from_table, possible, wire_defaults
+from wirebayes.model.prior_names import place_of_prior
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import LENGTH_EXPONENT, MATERIAL, SAMPLE, Sample
 from wirebayes.model.scales import Scales, Units, scales_of
@@ -17,7 +16,6 @@ from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.numeric.any_distribution import ours, scaled
 from wirebayes.numeric.distributions import LogUniform
 from wirebayes.numeric.means import geometric_mean
-from wirebayes.strict.hint import hint
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.effect import Amplitude, Effect, Typical
 from wirebayes.wire.model import Model, tension_reference
@@ -50,7 +48,7 @@ def build(
     Raises
     ------
     InputError
-        If a prior in the file names no parameter, or is malformed.
+        If a prior in the file is malformed. (`check_prior_names` finds those that no model has a parameter for.)
     """
     materials = by_material(experiments)
     scales = scales or scales_of(experiments)
@@ -254,38 +252,14 @@ def _extent(experiment: Experiment) -> float:
 def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experiment]) -> set[str]:
     """Put the priors of the files in place of the defaults, and return the columns that have one."""
     stated = set()
-    known = {*MATERIAL, *SAMPLE, LENGTH_EXPONENT}
     for experiment in experiments:
         marks = experiment.name, experiment.material, experiment.control
         for name, table in experiment.priors.items():
-            key = _place_of_prior(experiment, name)
+            key = place_of_prior(experiment, name)
             wanted = possible(key, name, from_table(key, table))
             columns = [*(f"{name}[{mark}]" for mark in marks), name]
             column = next((each for each in columns if each in distributions), None)
             if column is not None:
                 distributions[column] = wanted
                 stated.add(column)
-            elif name not in known and "." not in name:
-                expected = f"one of {', '.join(sorted(known))}, or effect.parameter"
-                raise InputError(f"{key}: found no such parameter{hint(name, sorted(known))}, expected {expected}")
-            else:
-                _check_amplitude(key, name)
     return stated
-
-
-def _check_amplitude(key: str, name: str) -> None:
-    """Refuse the prior of an amplitude that an effect of the catalogue does not have; other effects may be a user's."""
-    effect, _, amplitude = name.partition(".")
-    kind = CATALOGUE.get(effect)  # other forms, which have an @, may have other amplitudes
-    if kind is None:
-        return
-    names = [f"{effect}.{known.name}" for known in kind.amplitudes]
-    if name not in names:
-        raise InputError(f"{key}: found no amplitude {amplitude} of {effect}, expected {' or '.join(names)}")
-
-
-def _place_of_prior(experiment: Experiment, name: str) -> str:
-    """File, line and key of a parameter's prior, for messages."""
-    line = experiment.prior_lines.get(name)
-    place = f"{experiment.source}, line {line}" if line else f"{experiment.source}"
-    return f"{place}: prior.{name}"
