@@ -52,3 +52,38 @@ def test_a_move_beside_a_pose_that_was_lost_is_judged_by_its_other_end():
     times = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
     found = _accelerations(times, _on(times, [0.0, 0.0, 1.0, np.nan, 1.0]))
     np.testing.assert_allclose(found[:2], 2.0)
+
+
+def _stepped(move_s, way_m=0.05):
+    """Two moves between stops of a minute, as a log that has a row at the end of each stop and one behind it."""
+    starts = np.array([0.0, 60.0, 120.0])
+    times = np.sort(np.concatenate([starts + move_s, starts + 60.0]))
+    return times, _on(times, way_m * np.repeat([0.0, 1.0, 2.0], 2))
+
+
+@pytest.mark.parametrize(("times_gravity", "told"), [(49.0, "% of its weight"), (51.0, "no platform is so fast")])
+def test_moves_faster_than_any_platform_have_no_inertia_that_could_be_told(times_gravity, told):
+    """From rest to rest within a time, a way takes four times itself over the time squared."""
+    times, position = _stepped(np.sqrt(4.0 * 0.05 / (times_gravity * GRAVITY)))
+    (notice,) = _dynamics(times, position)
+    assert told in notice.text and notice.kind == "left-out"
+
+
+def test_moves_without_a_duration_are_counted_and_hide_no_other():
+    times, position = _stepped(0.001)
+    (notice,) = _dynamics(times, position)
+    assert "from 60 s on the log leaves 0.001 s for 50 mm, and in 1 other move:" in notice.text
+    shuttled = np.concatenate([times, times[-1] + np.array([0.5, 60.0])])
+    back = np.concatenate([position, position[:1], position[:1]])
+    timeless, real = _dynamics(shuttled, back)
+    assert "no platform is so fast" in timeless.text and "at 180 s it takes 16 % of its weight" in real.text
+
+
+def test_a_pose_that_was_lost_beside_a_move_without_a_duration_is_no_move():
+    times, position = _stepped(0.001)
+    position[2:4] = np.nan
+    position[4:] = position[5]
+    assert not _dynamics(times, position)
+    position[3] = position[4] + 1.0
+    (notice,) = _dynamics(times[2:], position[2:])
+    assert "no platform is so fast" in notice.text

@@ -3,7 +3,7 @@
 import numpy as np
 
 from wirebayes.json_files.pose_history import PoseHistoryJson
-from wirebayes.numeric.typing import Floats, Ints
+from wirebayes.numeric.typing import Bools, Floats, Ints
 from wirebayes.result_warnings import Notice
 from wirebayes.robot.history.corrections import Target
 from wirebayes.robot.history.estimate import Estimate
@@ -13,11 +13,12 @@ from wirebayes.robot.mechanics import sag, wire_doubts
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.motion import inverse, plausible
-from wirebayes.sentences import short
+from wirebayes.sentences import counted, short
 
 _FEWEST = 50  # effective draws; of so many, what lies beyond a 5 % quantile is 2 to 8 %
 _NAMED = 6  # times in a warning: as many as a line holds
 _INERTIA = 0.05  # of the weight: a force above it changes tensions by as much as the creep that is looked for
+_POSSIBLE = 50.0  # of the weight: cable robots built for speed reach 43 times the acceleration of gravity
 _STILL = 1e-2  # of the speed of a move: a platform that is so slow beside it stands still
 _MISFIT = 2.0  # mean squared residual from which on the readings contradict the model
 
@@ -149,7 +150,7 @@ def _unsure_clock(history: History, content: PoseHistoryJson) -> list[Notice]:
 
 
 def _dynamics(times_s: Floats, position_m: Floats) -> list[Notice]:
-    """A notice that a platform accelerates too much for its inertia to be left out.
+    """Notices that a platform accelerates too much for its inertia to be left out, or faster than any can.
 
     Parameters
     ----------
@@ -160,12 +161,41 @@ def _dynamics(times_s: Floats, position_m: Floats) -> list[Notice]:
         return []
     share = _accelerations(times_s, position_m) / GRAVITY
     share = np.where(np.isfinite(share), share, 0.0)
-    k = int(share.argmax())
-    if share[k] <= _INERTIA:
-        return []
+    at_once = share > _POSSIBLE
+    of_moves = np.where(at_once, 0.0, share)
+    out = _timeless(times_s, position_m, at_once) if at_once.any() else []
+    k = int(of_moves.argmax())
+    if of_moves[k] > _INERTIA:
+        text = (
+            f"the platform's inertia is left out: at {times_s[k + 1]:.10g} s it takes {short(100 * of_moves[k], 2)} % "
+            "of its weight or more to accelerate it, so tensions and poses are those of a slower motion along the same "
+            "way"
+        )
+        out.append(Notice("left-out", text))
+    return out
+
+
+def _timeless(times_s: Floats, position_m: Floats, at_once: Bools) -> list[Notice]:
+    """A notice of moves for which the log leaves no time, so that it says nothing of their inertia.
+
+    Parameters
+    ----------
+    times_s : (t,) array
+    position_m : (t, 3) array
+    at_once : (t - 2,) bool array
+        Rows between the first and the last at which no platform could be accelerated as the rows say.
+    """
+    step = np.diff(times_s)
+    way = np.linalg.norm(np.diff(position_m, axis=0), axis=1)
+    speed = np.nan_to_num(way / step)
+    before = np.flatnonzero(at_once)
+    moves = np.unique(np.where(speed[before] >= speed[before + 1], before, before + 1))
+    first = moves[0]
+    more = len(moves) - 1
+    others = f", and in {counted(more, 'other move')}" if more else ""
     text = (
-        f"the platform's inertia is left out: at {times_s[k + 1]:.10g} s it takes {short(100 * share[k], 2)} % of "
-        "its weight or more to accelerate it, so tensions and poses are those of a slower motion along the same way"
+        f"from {times_s[first]:.10g} s on the log leaves {short(step[first], 2)} s for {short(1e3 * way[first], 2)} mm"
+        f"{others}: no platform is so fast, so how long such moves took is not known, and their inertia is left out"
     )
     return [Notice("left-out", text)]
 
