@@ -29,6 +29,12 @@ def file_of(tmp_path, header, rows):
         ([f"{0.02 * i:.2f}" for i in range(1, 20)], 0.01),  # 2^-19, that of all readings none is odd by chance
         ([f"{0.02 * i:.2f}" for i in range(1, 21)], 0.02),
         ([f"{0.5 * i:.1f}" for i in range(1, 12)], 0.5),  # 5^-11
+        ([f"{i / 2:.2f}" for i in range(1, 12)], 0.5),
+        ([f"{i / 64:.3f}" for i in range(1, 20)], 1 / 64),  # a ruler in inches
+        ([f"{i / 16:.3f}" for i in range(1, 20)], 1 / 16),  # .0625 may be .062 or .063
+        ([f"{i / 64:.2f}" for i in range(1, 36)], 0.01),  # 0.68^35
+        ([f"{i / 64:.2f}" for i in range(1, 37)], 1 / 64),
+        ([f"{i / 64 + 0.001 * (i == 7):.3f}" for i in range(1, 20)], 0.001),  # one of them lies on no such line
         ([f"{i / 10}2345671" for i in range(11, 23)], 1e-8),  # nine digits
         ([f"{i / 10}23456711" for i in range(11, 23)], None),
         ([f"{i / 10:.1f}" for i in range(11, 22)], 0.1),  # a tenth of the range
