@@ -30,6 +30,7 @@ def file_of(tmp_path, header, rows):
         ([f"{0.02 * i:.2f}" for i in range(1, 21)], 0.02),
         ([f"{0.5 * i:.1f}" for i in range(1, 12)], 0.5),  # 5^-11
         ([f"{i / 2:.2f}" for i in range(1, 12)], 0.5),
+        ([f"{10 * i}" for i in range(1, 12)], 10.0),
         ([f"{i / 64:.3f}" for i in range(1, 20)], 1 / 64),  # a ruler in inches
         ([f"{i / 16:.3f}" for i in range(1, 20)], 1 / 16),  # .0625 may be .062 or .063
         ([f"{i / 64:.2f}" for i in range(1, 36)], 0.01),  # 0.68^35

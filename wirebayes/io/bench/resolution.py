@@ -61,6 +61,8 @@ def _binary_step(values: set[Decimal], unit: Decimal) -> Decimal:
 
     Rulers in inches are read so, and kitchen scales in pounds.
     """
+    if unit >= 1:
+        return unit
     per_whole = int(1 / unit)
     last_places = {int(value / unit) % per_whole for value in values}
     for parts in BINARY_PARTS:
