@@ -50,7 +50,7 @@ def test_without_such_rows_nothing_is_said(tmp_path):
     path = tmp_path / "raw.csv"
     rows = [f"{load};{300 * i + t};{load * 10 + t / 900}" for i, load in enumerate(LOADS_KG) for t in READ_S[:-1]]
     path.write_text("\n".join(["Gewicht [kg];Zeit [s];Messuhr [mm]", *rows]))
-    assert not any("without a weight" in note for note in convert(path, ABOUT, Choices()).notes)
+    assert not any("the wire recovers" in note for note in convert(path, ABOUT, Choices()).notes)
 
 
 @pytest.mark.parametrize(("times", "rest"), [(0.99, True), (1.01, False)])

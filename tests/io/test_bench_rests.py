@@ -43,4 +43,5 @@ def test_times_of_the_test_tell_rests_and_they_stay_with_it(tmp_path, header, we
 def test_times_of_each_hold_do_not_tell_rests_which_is_said(tmp_path, header, weights):
     made = rested(tmp_path, header, weights=weights, since="hold")
     assert [hold.duration_s for hold in made.experiment.holds] == [READ_S[-1]] * 4
-    assert any("when a hold ended is not known" in note for note in made.notes)
+    what = "a weight was taken off" if weights else "a hold ended"
+    assert any(f"when {what} is not known" in note for note in made.notes)

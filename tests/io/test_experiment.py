@@ -583,6 +583,11 @@ def test_under_weights_the_tension_is_set_and_the_displacement_read(tmp_path):
     assert (rest.recorded, rest.start_s, last.start_s) == (False, 90.0, 150.0)
 
 
+def test_a_rest_without_a_weight_has_next_to_nothing_to_creep_under(tmp_path):
+    (experiment,) = read_experiments(under_weights(tmp_path, ("tension_N = 3.0", "tension_N = 0")))
+    assert [hold.tension_N for hold in experiment.holds] == [2.0, 2e-6, 4.0]
+
+
 @pytest.mark.parametrize(
     ("toml", "csv", "message"),
     [
@@ -593,7 +598,7 @@ def test_under_weights_the_tension_is_set_and_the_displacement_read(tmp_path):
             ("", ""),
             "found an unknown key, expected only before_hold, tension_N",
         ),
-        (("tension_N = 3.0", "tension_N = 0.0"), ("", ""), "expected a tension above 0 N"),
+        (("tension_N = 3.0", "tension_N = -0.1"), ("", ""), "expected a tension of 0 N (no weight) or more"),
         (("", ""), (",4\n2,", ",5\n2,"), "line 6, column 4 (tension_N): found 4, expected 5 as before in hold 2"),
         (("", ""), ("2,4.3", "2,9000"), "line 6, column 2 (displacement_mm): found 9000, expected at most 8 times"),
         (("", ""), ("0,2\n", "0,-2\n"), "line 2, column 4 (tension_N): found -2, expected a tension above 0 N"),

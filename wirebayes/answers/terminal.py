@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 from wirebayes.answers.creep import creep_as_long_as_held, lengths_in_words
+from wirebayes.answers.holds_table import holds_table
 from wirebayes.answers.verdict import (
     control_judged,
     lead_may_be_chance,
@@ -12,7 +13,7 @@ from wirebayes.answers.verdict import (
     what_it_is,
 )
 from wirebayes.json_files.batch import BatchJson, Row
-from wirebayes.json_files.check import CheckedExperiment, EffectSize, HoldUnderstood, ParameterRange
+from wirebayes.json_files.check import CheckedExperiment, EffectSize, ParameterRange
 from wirebayes.json_files.comparison import ComparedModel, ComparedModels
 from wirebayes.json_files.discovery import AmplitudeEstimate, ExperimentFindings
 from wirebayes.json_files.imported import ImportedExperiment
@@ -248,7 +249,7 @@ def of_check(name: str, test: CheckedExperiment) -> list[str]:
     if test["temperature_C"]:
         coldest, warmest = test["temperature_C"]
         lines.append(f"  temperature from {short(coldest, 3)} to {short(warmest, 3)} °C")
-    lines += _holds_table(test, unit)
+    lines += holds_table(test, unit)
     lines += _determined(test)
     lines += _shown(test)
     ends = test["hold_ends"]
@@ -287,34 +288,6 @@ def _determined(test: CheckedExperiment) -> list[str]:
                 ranges.append(f"{name} {_with_unit(parameter)}")
         lines += _list(f"parameters from the {source}", ranges)
     return lines
-
-
-def _holds_table(test: CheckedExperiment, unit: str) -> list[str]:
-    """A line for each hold: what was set, when it begins, how long it lasts, and what was read, in `unit`."""
-    weights = test["control"] == "force"
-    setting = "weight" if weights else "displacement"
-    lines = [f"  {'hold':>4} {setting:>13} {'begins':>9} {'lasts':>9}  readings"]
-    for hold in test["holds"]:
-        number = "-" if hold["number"] is None else hold["number"]
-        place = f"{hold['tension_N']:g} N" if weights else f"{hold['displacement_mm']:g} mm"
-        begins = _to_the_second(hold["start_s"])
-        lasts = _to_the_second(hold["duration_s"])
-        lines.append(f"  {number:>4} {place:>13} {begins:>9} {lasts:>9}  {_course(hold, unit)}")
-    return lines
-
-
-def _to_the_second(seconds: float) -> str:
-    """A time of a test, to four digits and a second at least."""
-    return f"{short(seconds, max(4, len(str(int(seconds)))))} s"
-
-
-def _course(hold: HoldUnderstood, unit: str) -> str:
-    """What was read in a hold."""
-    if hold["number"] is None or hold["first_s"] is None:
-        return "none: held, not recorded"
-    first = read_value(hold, "first")
-    last = read_value(hold, "last")
-    return f"{hold['readings']} from {short(hold['first_s'])} s on, {short(first, 4)} to {short(last, 4)} {unit}"
 
 
 _SHOWS = {

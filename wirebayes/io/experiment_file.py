@@ -12,7 +12,7 @@ from unicodedata import normalize
 from wirebayes.errors import InputError, shown
 from wirebayes.io import mistaken_table
 from wirebayes.io.experiment import ENOUGH, Experiment, enough, folder_key, holds_and_readings, in_sequence
-from wirebayes.io.readings import READ, SET, STRETCH, Hold, checked_readings, readings_table
+from wirebayes.io.readings import HANGS_FREE, READ, SET, STRETCH, Hold, checked_readings, readings_table
 from wirebayes.numeric.frozen import frozen
 from wirebayes.strict.files import read_text
 from wirebayes.strict.hint import hint
@@ -245,6 +245,8 @@ def _with_unrecorded(keys: Keys, holds: tuple[Hold, ...], length_mm: float, cont
     known = None
     for index, entry in enumerate(entries):
         before_hold, unrecorded = _unrecorded(entry, last, where, length_mm, control)
+        if control == "force" and unrecorded.setting == 0:
+            unrecorded = replace(unrecorded, setting=HANGS_FREE * min(hold.setting for hold in holds))
         if entry.table == known:
             raise keys.complain(f"unrecorded_holds[{index}]", "the hold before it once more", "each hold once")
         known = entry.table
@@ -282,7 +284,8 @@ def _unrecorded_setting(keys: Keys, length_mm: float, control: Control) -> float
     """The displacement or the tension of one unrecorded hold."""
     if control == "force":
         most = LARGEST["tension_N"]
-        return keys.number("tension_N", f"a tension above 0 N, at most {most:.0e} N", above=0.0, most=most)
+        expected = f"a tension of 0 N (no weight) or more, at most {most:.0e} N"
+        return keys.number("tension_N", expected, least=0.0, most=most)
     expected = f"a displacement above -{length_mm:g} mm, the wire's length, and of at most {STRETCH:g} times it"
     return keys.number("displacement_mm", expected, above=-length_mm, most=STRETCH * length_mm)
 

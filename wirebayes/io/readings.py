@@ -25,6 +25,8 @@ OPTIONAL = ("temperature_C",)
 SET: dict[Control, str] = {"displacement": "displacement_mm", "force": "tension_N"}
 READ: dict[Control, str] = {"displacement": "tension_N", "force": "displacement_mm"}
 
+HANGS_FREE = 1e-6  # of the smallest weight, where none hangs: creep goes with a power of a tension above zero
+
 UNIT: dict[str, str] = {"displacement_mm": "mm", "tension_N": "N"}
 
 
@@ -193,7 +195,7 @@ class _Rows:
         if self.control == "force" and not self.setting[row] > 0:
             rest = ""
             if self.setting[row] == 0:
-                rest = ": of a rest, the weight of the empty hook; a rest that is not read is one of unrecorded_holds"
+                rest = ": of a rest, the weight of the empty hook; one that is not read is an unrecorded hold"
             raise self.complain(row, SET[self.control], f"a tension above 0 N{rest}")
         if self.time_s[row] < 0:
             raise self.complain(row, "time_s", "0 s or later")

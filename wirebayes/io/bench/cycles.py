@@ -6,8 +6,8 @@ one of them beside the time that the creep takes.
 
 import numpy as np
 
-from wirebayes.io.bench.no_weight import NEXT_TO_NOTHING
 from wirebayes.io.bench.recorded import Cycles, Readings
+from wirebayes.io.readings import HANGS_FREE
 from wirebayes.numeric.typing import Floats
 from wirebayes.sentences import lasting, short
 
@@ -36,7 +36,7 @@ def cycles_before(readings: Readings, before_hold: int, left: int, turn: int, en
     setting = _equivalent(readings, begin, turn, end_s)
     role, unit = readings.role, readings.unit
     if role == "tension":
-        setting = max(setting, NEXT_TO_NOTHING * high)
+        setting = max(setting, HANGS_FREE * high)
     lasts = lasting(end_s - begin_s)
     sentence = (
         f"before hold {before_hold} the {role} went to and fro between {short(low, 4)} and {short(high, 4)} {unit} for "

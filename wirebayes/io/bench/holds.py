@@ -48,6 +48,10 @@ ENDS_UNKNOWN = (
     "when a hold ended is not known: if the wire rested between its last reading and the next move, add a row without "
     "a reading at the moment of that move"
 )
+WEIGHTS_LEFT_UNKNOWN = (
+    "when a weight was taken off is not known: if it hung on after its last reading, add a row without a reading at "
+    "that moment; if the wire rested without a weight before the next one, say so with unrecorded_holds, tension_N = 0"
+)
 
 
 def cut(readings: Readings, time_since: TimeSince | None) -> Cut:
@@ -170,7 +174,7 @@ def _cut_into_groups(
             times[hold] = times[hold] - zero
         notes += _unread_ends(times, ends, readings.role)
     elif len(groups) > 1:
-        notes.append(ENDS_UNKNOWN)
+        notes.append(ENDS_UNKNOWN if readings.role == "displacement" else WEIGHTS_LEFT_UNKNOWN)
     if any(np.ptp(x[rows]) > 0 for rows in groups):
         levels = [level_of(x[rows]) for rows in groups]
         notes.append(_scatter(readings, groups))
@@ -296,9 +300,12 @@ def _unread_ends(times: list[Floats], ends: Sequence[float | None], role: str) -
     if not unread:
         return []
     longest = lasting(max(unread.values()))
+    rest = "a rest in between is one of unrecorded_holds"
+    if role == "tension":
+        rest = "if the wire rested without a weight in between, say so with unrecorded_holds, tension_N = 0"
     return [
         f"{holds_in_words(unread)}: the next one begins up to {longest} after the last reading, and the {role} is "
-        "taken to stay until then; a rest in between is one of unrecorded_holds"
+        f"taken to stay until then; {rest}"
     ]
 
 

@@ -10,10 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from wirebayes.io.bench.recorded import Cut
+from wirebayes.io.readings import HANGS_FREE
 from wirebayes.numeric.typing import Floats
 from wirebayes.sentences import holds_in_words, listed
-
-NEXT_TO_NOTHING = 1e-6  # of the smallest weight: creep goes with a power of the tension, which has to be above zero
 
 SCATTER = 3.0  # median distances of tensions from that of their hold: nearer zero, a load cell reads no weight
 
@@ -36,7 +35,7 @@ def without_weight(holds: Cut, tension_N: Floats) -> Cut:
         return holds
     first, end = loaded[0], loaded[-1] + 1
     kept = slice(first, end)
-    nothing = NEXT_TO_NOTHING * min(holds.setting[i] for i in loaded)
+    nothing = HANGS_FREE * min(holds.setting[i] for i in loaded)
     setting = [*holds.setting]
     rests = []
     for i in range(first, end):
