@@ -350,7 +350,13 @@ def test_a_move_in_a_pause_of_the_recording_has_no_duration(pause_s, recorded_mo
     assert ("moves took 0.1 s (median)" in notes) == recorded_move
 
 
-@pytest.mark.parametrize(("turns", "named"), [([], False), ([5.0, 0.0, 5.0, 0.0], True), ([4.5], False), ([7.0], True)])
+AT_THE_FOOT = [[5.0, 0.0, 5.0, 0.0], [12.0, 0.0, 12.0, 0.0], [12.0, 0.0], [40.0, 0.0, 40.0, 0.0]]
+
+
+@pytest.mark.parametrize(
+    ("turns", "named"),
+    [([], False), *((turns, True) for turns in AT_THE_FOOT), ([4.5], False), ([4.5, 3.8, 4.1], False), ([7.0], True)],
+)
 def test_cycles_before_a_hold_are_no_part_of_the_move_to_it(tmp_path, turns, named):
     """At 1 mm/s, to 4 mm and later to 8 mm; an overshoot of an eighth is one of the move."""
     places = [0.0, *turns, 4.0]
@@ -364,7 +370,7 @@ def test_cycles_before_a_hold_are_no_part_of_the_move_to_it(tmp_path, turns, nam
     )
     made = convert(path, About("wire", "line", 1000.0), Choices())
     first = made.experiment.recorded_holds[0]
-    middle = 0.5 * len(way) - 2.0 if turns in ([], [5.0, 0.0, 5.0, 0.0]) else None
+    middle = 0.5 * len(way) - 2.0 if turns in ([], *AT_THE_FOOT) else None
     assert made.recording is not None
     if middle is not None:
         assert made.recording.start_s[int(named)] == pytest.approx(middle, abs=0.3)

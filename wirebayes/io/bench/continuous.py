@@ -21,6 +21,7 @@ LONG = 10  # times as many readings: shorter holds have none to spare
 # of a hold at most is left out after a slow move; of slower ones k2 is off by up to 5 standard deviations
 AFTER_MOVE = 0.1
 SLACK = 0.05  # of what is read in the hold: a rest before it with less says nothing of the wire
+AT_TURN = 0.05  # of the range of the way: as near to its end cycles turn
 TURN = 0.5  # of the way to a hold: smaller ones are an overshoot or a drive that hunts
 READ_ENOUGH = 10  # readings of a hold that is short beside the others: with fewer it is passed
 OF_MOVES = 3.0  # times the moves beside it: a stop of a move that is made bit by bit is hardly longer than these
@@ -166,16 +167,42 @@ def _lengths(zeros: Sequence[float], cycles: Sequence[Cycles], last_s: float) ->
 def _last_turn(x: Floats, left: int, hold: Plateau) -> int:
     """The reading at which the last move to a hold began: `left`, or after cycles without holds where the last turned.
 
-    A turn counts that is as far from the hold as half of what lies between, as an overshoot is not.
+    A turn counts that is as far from the hold as half of what lies between, as an overshoot is not, or where the wire
+    turned before, as at the foot of cycles.
     """
-    away = np.abs(hold.level - x[left : hold.begin + 1])
+    way = x[left : hold.begin + 1]
+    return left + max(_far_turn(way, hold.level), _turn_again(way, hold.level))
+
+
+def _far_turn(way: Floats, level: float) -> int:
+    """The last turn that is as far from the hold as half of the way to it; 0 without one."""
+    away = np.abs(level - way)
     farthest = len(away) - 1
     for i in range(len(away) - 1, -1, -1):
         if away[i] > away[farthest]:
             farthest = i
         if away[farthest] >= TURN * away.max() and away[i] < (1.0 - TURN) * away[farthest] and i < farthest:
-            return left + farthest
-    return left
+            return farthest
+    return 0
+
+
+def _turn_again(way: Floats, level: float) -> int:
+    """The last turn at the lowest or highest place of the way, where it was before and which it left; 0 without one."""
+    span = float(np.ptp(way))
+    last = 0
+    for side in (way, -way):
+        height = side - side.min()
+        at_end = height <= AT_TURN * span
+        hold_is_there = abs(level - way[height.argmin()]) <= AT_TURN * span
+        left_between = np.flatnonzero(height > 0.5 * span)
+        if hold_is_there or not left_between.size:
+            continue
+        visits = np.flatnonzero(at_end)
+        beyond = left_between[left_between < visits[-1]]
+        if beyond.size and visits[0] < beyond[-1]:
+            last_visit = visits[visits > beyond[-1]]
+            last = max(last, int(last_visit[height[last_visit].argmin()]))
+    return last
 
 
 def _lasted(time: Floats, left: int, hold: Plateau, zero_s: float) -> float:
