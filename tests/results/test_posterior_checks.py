@@ -43,7 +43,7 @@ def draws(problem, **changes):
 
 def test_the_setting_error_is_compared_with_the_steps(simulated):
     sample = simulated.problem.samples[0]
-    for sd, warned in ((0.34, False), (0.36, True)):
+    for sd, warned in ((0.24, False), (0.26, True)):
         assert bool(posterior_checks.loose_steps(draws(simulated.problem, setting_sd=sd), sample)) == warned
 
 
@@ -203,7 +203,7 @@ def test_steps_are_the_typical_ones_of_those_that_move(simulated):
     """Their median, whatever the direction; holds at one place are no steps."""
     protocol = replace(simulated.problem.samples[0].protocol, setting=np.array([0.0, 2.0, 2.0, 0.0, 0.0, 2.0, 9.0]))
     sample = replace(simulated.problem.samples[0], protocol=protocol)
-    for sd, warned in ((0.69, False), (0.71, True)):
+    for sd, warned in ((0.49, False), (0.51, True)):
         found = posterior_checks.loose_steps({"setting_sd": np.full(9, sd)}, sample)
         assert bool(found) is warned and ("steps by 2 mm" in found) is warned
     still = replace(sample, protocol=replace(protocol, setting=np.full(7, 3.0)))

@@ -23,7 +23,7 @@ from wirebayes.sentences import short, some_of
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.staircase import linearise
 
-LOOSE_STEPS = 0.35  # setting error over the typical step, which its prior ends at a half of: it presses against that
+LOOSE_STEPS = 0.25  # setting error over the typical step: its prior has 1 % beyond, and nobody sets so carelessly
 NOISY = 0.25  # sensor error over the range of the tensions: half their spread is noise
 QUIET = 2 * FINEST  # sensor and rounding error over the largest tension: finer than a load cell resolves
 FAR_OUT = 3.7  # standard deviations from the middle of k1's prior: one line in five thousand, a factor of 260 off
@@ -132,8 +132,8 @@ def loose_steps(own: Mapping[str, Floats], sample: Sample) -> str:
     settings, read = ("weights", "displacements") if unit == "N" else ("displacements", "tensions")
     return (
         f"setting_sd is at least {short(low, 2)} {unit} while the test steps by {short(step, 3)} {unit}: the "
-        f"{settings} do not explain the {read}; look for holds in the wrong order, readings of two wires mixed, or "
-        "another unit"
+        f"{settings} do not explain the {read}; look for holds in the wrong order, rests that are not stated, "
+        "readings of two wires mixed, or another unit"
     )
 
 
