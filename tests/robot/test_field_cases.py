@@ -71,6 +71,15 @@ def test_anchors_with_their_error_stated_give_lengths_that_hold_the_truth(run, s
 
 
 @pytest.mark.slow
+def test_no_sensor_is_blamed_for_anchors_that_are_off_by_more_than_is_stated(run):
+    """Errors of sensors would restore the balance, and leave joint values that contradict it."""
+    options = ("--tension-sd", "0.5", "--anchor-sd", "3")  # off by 10 mm
+    _, said, found, _ = _calibrate(run, ANCHORS / "hp4.toml", ANCHORS / "t1-0.010.csv", *options)
+    assert not found["usable"] and found["sensors_at_fault"] is None
+    assert "tension sensor" not in said
+
+
+@pytest.mark.slow
 def test_a_real_printers_anchors_agree_with_an_independent_least_squares(run):
     options = ("--tension-sd", "5", "--reference-sd", "50", "--anchor-sd", "50")
     _, _, found, _ = _calibrate(run, ANCHORS / "hp4-rough.toml", ANCHORS / "hp-session.csv", *options)

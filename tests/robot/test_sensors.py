@@ -9,7 +9,9 @@ import pytest
 from scipy.stats import chi2
 
 from wirebayes.robot.self_calibration import sensors
+from wirebayes.robot.self_calibration.equations import Holds
 from wirebayes.robot.self_calibration.sensors import sensor_notices, sensors_json, weighed
+from wirebayes.robot.self_calibration.session import Session
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 
 PRIOR_N = 100.0
@@ -106,13 +108,77 @@ def test_at_a_single_hold_no_sensor_is_looked_at(read, looked_at, monkeypatch):
     assert len(began) == looked_at
 
 
-@pytest.mark.parametrize("joint_m", [0.0, 1e-3, None])
-@pytest.mark.parametrize(("p", "left", "little"), [(0.0099, 0.201, True), (0.0099, 0.199, False), (0.0101, 0.9, False)])
-def test_sensors_that_explain_less_than_four_fifths_are_not_blamed(p, left, little, joint_m, monkeypatch):
-    """Where the error of the joint values is estimated it takes up what contradicts, and a ratio says nothing."""
+@pytest.fixture
+def posteriors(monkeypatch):
+    """Stand-ins for posteriors, of which nothing but their trust, misfit and evidence is asked."""
     monkeypatch.setattr(sensors, "trust", lambda found: found.p)
     monkeypatch.setattr(sensors, "misfit", lambda found: found.misfit)
-    errors = SimpleNamespace(joint_m=joint_m)
-    found = SimpleNamespace(misfit=100.0, unknowns=SimpleNamespace(errors=errors))
-    other = SimpleNamespace(p=p, misfit=100.0 * left)
-    assert sensors._explain_little(found, other) is (little and joint_m is not None)
+
+    def made(p, misfit=1.0, evidence=0.0):
+        return SimpleNamespace(p=p, misfit=misfit, evidence=evidence)
+
+    return made
+
+
+BEFORE = 1e-15  # its fifth root is a thousandth
+
+
+@pytest.mark.parametrize(
+    ("p", "left", "little"), [(0.0009, 0.201, True), (0.0009, 0.199, False), (0.0011, 0.9, False), (0.0, 0.9, True)]
+)
+def test_sensors_that_explain_less_than_four_fifths_are_not_blamed(p, left, little, posteriors):
+    assert sensors._explain_little(posteriors(BEFORE, 100.0), posteriors(p, 100.0 * left)) is little
+    assert not sensors._explain_little(posteriors(SIGNIFICANT, 100.0), posteriors(p, 100.0 * left))
+    assert sensors._explain_little(posteriors(0.0, 100.0), posteriors(0.0, 90.0))  # too small for a logarithm
+
+
+def _alone(posterior, bias_N):
+    return sensors._Errors(posterior, np.full(4, bias_N), np.eye(4))
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "wires"),
+    [
+        ((0.0, 200.0), (0.0, 0.0), [0]),  # as likely as errors of all
+        ((0.0, 200.0), (0.0, 199.0), [0, 1]),
+        ((0.011, 140.0), (0.0, 0.0), [0]),  # nothing contradicts any more
+        ((0.009, 140.0), (0.0, 0.0), []),
+        ((0.011, 140.0), (0.011, 150.0), [1]),
+        ((0.0, 161.0), (0.0, 0.0), [0]),  # four fifths
+        ((0.0, 159.0), (0.0, 0.0), []),
+    ],
+)
+def test_sensors_tried_alone_are_named_by_what_their_errors_gain(first, second, wires, posteriors):
+    screened = weighed(*_estimate(np.array([9.0, 9.0, 9.0, 9.0]), np.eye(4)), PRIOR_N)
+    each = {i: _alone(posteriors(p, evidence=0.5 * gain), 3.0 + i) for i, (p, gain) in enumerate([first, second])}
+    found = sensors._compared(screened, posteriors(BEFORE), 200.0, each)
+    assert found.wires == wires
+    np.testing.assert_array_equal(found.bias_N, [3.0, 4.0, *screened.bias_N[2:]])
+
+
+def test_where_little_contradicted_a_sensor_must_leave_much_less(posteriors):
+    """A level that is just passed again shows nothing: the fifth root of the probability before is asked for."""
+    screened = weighed(*_estimate(np.array([9.0, 9.0, 9.0, 9.0]), np.eye(4)), PRIOR_N)
+    for p, wires in ((0.99, []), (1.01, [0])):
+        each = {0: _alone(posteriors(p * 1e-3**0.2, evidence=70.0), 3.0)}
+        assert sensors._compared(screened, posteriors(1e-3), 200.0, each).wires == wires
+
+
+def test_sensors_that_may_be_the_one_are_tried():
+    screened = replace(
+        weighed(*_estimate(np.ones(4), np.eye(4)), PRIOR_N),
+        explains=np.array([0.8, 0.41, 0.39, 0.1]),
+        p_alone=np.array([0.0, 0.0, 0.0, 0.02]),
+    )
+    assert sensors._perhaps(screened) == [0, 1, 3]
+
+
+def test_the_error_of_one_sensor_shows_in_its_readings_alone():
+    session = replace(_session(), motion=np.array([[1.0, -1.0, 0.0], [-1.0, 1.0, 1.0]]))
+    holds = Holds(session, np.ones((2, 3)))
+    np.testing.assert_array_equal(sensors._holds_of_one(holds, 1).session.signs, [[0, -1, 0], [0, 1, 0]])
+
+
+def _session():
+    """Two holds of three wires."""
+    return Session(np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.ones((2, 3)), np.ones(2), np.ones(2, bool), 1.0)

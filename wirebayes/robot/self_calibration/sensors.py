@@ -1,8 +1,9 @@
 """Which tension sensor is at fault, where readings contradict each other: one whose constant error explains it.
 
-All sensors are given an unknown error at once. Estimates that are zero to their errors show no fault; where all but one
-are, given that one, it is the one; where that is true of several, the readings do not tell them apart. Real sensors
-have more errors than one: where none explains all, one that explains most of it is still named.
+All sensors are given an unknown error at once. Estimates that are zero to their errors show no fault. Each that might
+explain it is then given one by itself, since errors that leave wires slack do not add up: where one makes readings as
+likely as all do, it is the one; where that is true of several, the readings do not tell them apart. Real sensors have
+more errors than one: where none does, the likeliest is still named if nothing contradicts beside its error, or little.
 """
 
 from dataclasses import dataclass, replace
@@ -12,10 +13,10 @@ from scipy.special import chdtrc
 
 from wirebayes.json_files.calibrate import SensorsAtFault
 from wirebayes.numeric.linear_algebra import inv, solve
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.progress import ShareDone, shares_of
 from wirebayes.result_warnings import Notice
-from wirebayes.robot.self_calibration.equations import Holds
+from wirebayes.robot.self_calibration.equations import Holds, State
 from wirebayes.robot.self_calibration.estimate import estimate
 from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.residuals import misfit, trust
@@ -26,6 +27,8 @@ from wirebayes.sentences import short
 LEAST_HOLDS = 2  # read: at a single one an error of a sensor and one of a length look the same
 _TRIES, _STILL = 3, 0.5  # searches, and standard deviations: along a narrow valley the last steps change little
 MOST = 0.8  # of what contradicts: two sensors as bad as each other explain half of it each
+_PERHAPS = 0.5  # of what the likeliest sensor explains, were all straight: sensors that explain less are not tried
+_NEVER = 1e-300  # a probability whose logarithm can still be taken
 _NEARLY_ALL = 99.5  # percent, which are rounded to all of it
 
 
@@ -42,7 +45,9 @@ class Suspects:
     p_alone : (w,) array
         Probability that the other sensors' errors are as large where this one alone has one.
     explains : (w,) array
-        Share of the sum of squares of all errors that this one alone explains.
+        Share of what the errors of all explain that this one alone explains.
+    suffices : (w,) bool array
+        Whether an error of this one alone leaves readings that do not contradict model and priors.
     """
 
     bias_N: Floats
@@ -50,14 +55,20 @@ class Suspects:
     p_none: float
     p_alone: Floats
     explains: Floats
+    suffices: Bools
 
     @property
     def wires(self) -> list[int]:
         """Wires, from 0, one of whose sensors is at fault; none where nothing or no single sensor explains it."""
         if not self.p_none < SIGNIFICANT:  # nor where it is not known
             return []
-        alone = self.p_alone >= SIGNIFICANT
-        return [int(i) for i in np.flatnonzero(alone if alone.any() else self.explains >= MOST)]
+        likeliest = self.explains == self.explains.max()
+        named = self.p_alone >= SIGNIFICANT
+        if not named.any():
+            named = self.suffices & likeliest
+        if not named.any():
+            named = self.explains >= MOST
+        return [int(i) for i in np.flatnonzero(named)]
 
 
 def weighed(bias_N: Floats, covariance: Floats, prior_sd_N: float) -> Suspects:
@@ -87,7 +98,7 @@ def weighed(bias_N: Floats, covariance: Floats, prior_sd_N: float) -> Suspects:
         alone = chdtrc(w - 1, left)
     share = np.clip(explained / max(total, 1e-300), 0.0, 1.0)
     by_chance = float(chdtrc(w, max(total, 0.0)))
-    return Suspects(score / own, own**-0.5, by_chance, alone, share)
+    return Suspects(score / own, own**-0.5, by_chance, alone, share, np.zeros(w, bool))
 
 
 def suspects(found: RobotPosterior, holds: Holds, progress: ShareDone = lambda share: None) -> Suspects | None:
@@ -109,11 +120,42 @@ def suspects(found: RobotPosterior, holds: Holds, progress: ShareDone = lambda s
     if not widest > 0:
         return None
     free = _with_biases(found, widest)
-    legs = unknowns.robot.legs
+    together, alone = shares_of(progress, 2)
+    of_all = _errors(free, holds, found, together)
+    if of_all is None or _explain_little(found, of_all.found):
+        progress(1.0)
+        return None
+    screened = weighed(of_all.bias_N, of_all.covariance, widest)
+    gain = _gain(found, of_all.found)
+    if not gain > 0.0:  # a search that came to a worse place
+        progress(1.0)
+        return screened
+    tried = _perhaps(screened)
+    each = {}
+    for i, part in zip(tried, shares_of(alone, len(tried)), strict=True):
+        of_one = _errors(free, _holds_of_one(holds, i), found, part)
+        if of_one is not None:
+            each[i] = of_one
+    progress(1.0)
+    return _compared(screened, found, gain, each)
+
+
+@dataclass(frozen=True)
+class _Errors:
+    """A posterior with errors of sensors, and these, N."""
+
+    found: RobotPosterior
+    bias_N: Floats
+    covariance: Floats
+
+
+def _errors(free: Unknowns, holds: Holds, found: RobotPosterior, progress: ShareDone) -> _Errors | None:
+    """The posterior in which sensors have errors, from one in which they have none; None where nothing converged."""
+    legs = free.robot.legs
+    widest = free.prior.bias_sd_N
     end = free.slices["wires"].stop
     sensors = slice(end - legs, end)
-    white = np.insert(found.state.white, end - legs, np.zeros(legs))
-    state = replace(found.state, white=white)
+    state = _with_no_error_yet(found.state, sensors)
     bias = np.full(legs, np.inf)
     for part in shares_of(progress, _TRIES):
         other = estimate(free, holds, state, part)
@@ -121,22 +163,65 @@ def suspects(found: RobotPosterior, holds: Holds, progress: ShareDone = lambda s
         before = bias
         bias = widest * state.white[sensors]
         covariance = widest**2 * other.covariance[sensors, sensors]
-        sd = np.sqrt(np.diag(covariance))
-        still = np.abs(bias - before) < _STILL * sd
+        still = np.abs(bias - before) < _STILL * np.sqrt(np.diag(covariance))
         if other.converged or still.all():
-            progress(1.0)
-            return None if _explain_little(found, other) else weighed(bias, covariance, widest)
+            return _Errors(other, bias, covariance)
     return None
 
 
-def _explain_little(found: RobotPosterior, other: RobotPosterior) -> bool:
-    """Whether errors of all sensors together leave more of what contradicts stated errors than one may leave.
+def _with_no_error_yet(state: State, sensors: slice) -> State:
+    """The state with errors of sensors among its unknowns, zero."""
+    none = np.zeros(sensors.stop - sensors.start)
+    return replace(state, white=np.insert(state.white, sensors.start, none))
 
-    Where the error of the joint values is estimated, it has taken up what contradicts.
+
+def _holds_of_one(holds: Holds, sensor: int) -> Holds:
+    """The holds where the error of no other sensor shows."""
+    signs = np.zeros_like(holds.session.signs)
+    signs[:, sensor] = holds.session.signs[:, sensor]
+    return replace(holds, session=replace(holds.session, motion=signs))
+
+
+def _gain(found: RobotPosterior, other: RobotPosterior) -> float:
+    """By how much errors of sensors make readings likelier: twice the difference of log densities."""
+    return 2.0 * (other.evidence - found.evidence)
+
+
+def _perhaps(screened: Suspects) -> list[int]:
+    """The sensors that might explain what contradicts."""
+    likely = screened.explains >= _PERHAPS * screened.explains.max()
+    return [int(i) for i in np.flatnonzero(likely | (screened.p_alone >= SIGNIFICANT))]
+
+
+def _compared(screened: Suspects, found: RobotPosterior, gain: float, each: dict[int, _Errors]) -> Suspects:
+    """What likelihoods say: what errors of all sensors gain, and that of each that was tried alone."""
+    w = len(screened.bias_N)
+    bias, sd = screened.bias_N.copy(), screened.sd_N.copy()
+    share, p_alone, suffices = np.zeros(w), np.zeros(w), np.zeros(w, bool)
+    for i, one in each.items():
+        own = _gain(found, one.found)
+        bias[i] = one.bias_N[i]
+        sd[i] = np.sqrt(one.covariance[i, i])
+        share[i] = np.clip(own / gain, 0.0, 1.0)
+        p_alone[i] = chdtrc(w - 1, max(gain - own, 0.0)) if w > 1 else 1.0
+        suffices[i] = trust(one.found) >= max(SIGNIFICANT, _explained_from(found))
+    return Suspects(bias, sd, float(chdtrc(w, gain)), p_alone, share, suffices)
+
+
+def _explain_little(found: RobotPosterior, other: RobotPosterior) -> bool:
+    """Whether errors of all sensors together leave more of what contradicts than one may leave.
+
+    Not asked where nothing but the balance contradicts. That they restore it is not enough: they would restore it for
+    geometry that is wrong, too.
     """
-    if found.unknowns.errors.joint_m is None or trust(other) >= SIGNIFICANT:
+    if trust(found) >= SIGNIFICANT or trust(other) >= min(SIGNIFICANT, _explained_from(found)):
         return False
     return misfit(other) > (1 - MOST) * misfit(found)
+
+
+def _explained_from(found: RobotPosterior) -> float:
+    """Probability from which on most of what contradicts is explained: of its logarithm, which follows the misfit."""
+    return float(max(trust(found), _NEVER) ** (1 - MOST))
 
 
 def _with_biases(found: RobotPosterior, sd_N: float) -> Unknowns:
@@ -186,7 +271,8 @@ def sensor_notices(found: Suspects | None) -> list[Notice]:
 def _how_much(found: Suspects) -> str:
     """How much of what contradicts any of the sensors explains; empty where it is all."""
     share = 100 * found.explains[found.wires].min()
-    all_explain = bool((found.p_alone[found.wires] >= SIGNIFICANT).all())
+    whole = (found.p_alone >= SIGNIFICANT) | found.suffices
+    all_explain = bool(whole[found.wires].all())
     return "" if all_explain or share >= _NEARLY_ALL else f"{share:.0f} % of "
 
 
