@@ -16,6 +16,7 @@ from wirebayes.numeric.typing import Array, Bools, Ints
 
 _ENOUGH = 0.25  # of what a step promises to gain: with less, damped ones are tried
 _LONGEST = 2.0  # step of a coordinate; they are of order one under the prior
+_FLATTEST = 1e-9  # of the largest curvature, that none falls below: a direction that is not seen
 _NARROW = 1e-2  # standard deviation assumed where none is known yet, so that differences stay inside it
 _NEAR = 1e-6  # step of a derivative: far above rounding, far below any standard deviation
 # nats by which differences may make a normal approximation's volume smaller than the expected information does: of
@@ -29,7 +30,10 @@ _RELAX, _LEAST_DAMPING = 0.2, 0.3  # share of the damping kept after a step that
 
 @dataclass(frozen=True)
 class _Local:
-    """A density at places: its value (n,), gradient (n, d), and curvature (n, d, d), minus the Hessian or nearly so."""
+    """A density at places: its value (n,), gradient (n, d), and curvature (n, d, d).
+
+    The curvature is minus the Hessian, or nearly so, and positive definite.
+    """
 
     value: Array
     gradient: Array
@@ -46,9 +50,8 @@ class _Climbs:
 
     Attributes
     ----------
-    z, value, slope, eigen, vectors
-        The places (n, d), the density (n,), and its gradient along the eigenvectors (n, d, d) of its curvature with
-        their eigenvalues (n, d).
+    z, value, gradient, curvature
+        The places (n, d), and there the density (n,), its gradient (n, d) and its curvature (n, d, d).
     ahead : (n, d) array
         Where to look next: at the end of a step, in the hope that it is taken, or, after another one, at `z`.
     promised : (n,) array
@@ -61,9 +64,8 @@ class _Climbs:
 
     z: Array
     value: Array
-    slope: Array
-    eigen: Array
-    vectors: Array
+    gradient: Array
+    curvature: Array
     ahead: Array
     promised: Array
     arrived: Bools
@@ -78,9 +80,8 @@ class _Climbs:
         return cls(
             z=start.copy(),
             value=np.full(n, -np.inf),
-            slope=np.zeros((n, d)),
-            eigen=np.full((n, d), _NARROW**-2),
-            vectors=np.tile(np.eye(d), (n, 1, 1)),
+            gradient=np.zeros((n, d)),
+            curvature=np.tile(_NARROW**-2 * np.eye(d), (n, 1, 1)),
             ahead=start.copy(),
             promised=np.zeros(n),
             arrived=np.ones(n, bool),
@@ -104,8 +105,7 @@ class _Climbs:
         """Lead rows whose step was not good to where the best damped one leads; those that none leads up are done."""
         if not len(rows):
             return
-        known = self.slope[rows], self.eigen[rows], self.vectors[rows]
-        trial, tried, by = _damped(density, self.z[rows], rows, *known)
+        trial, tried, by = _damped(density, self.z[rows], rows, self.gradient[rows], self.curvature[rows])
         better = tried > self.value[rows]
         self.done[rows] = ~better
         moved = rows[better]
@@ -117,29 +117,28 @@ class _Climbs:
     def take_step(self, rows: Ints, local: _Local, tolerance: float) -> None:
         """Lead rows to what they looked at, and plan their next steps from what is known there."""
         here = self.ahead[rows]
-        eigen, vectors = _positive(local.curvature)
-        slope = np.einsum("nij,ni->nj", vectors, local.gradient)
         self.z[rows] = here
         self.value[rows] = local.value
-        self.eigen[rows] = eigen
-        self.vectors[rows] = vectors
-        self.slope[rows] = slope
-        is_near = _half_decrement(slope, eigen) < tolerance
+        self.gradient[rows] = local.gradient
+        self.curvature[rows] = local.curvature
+        damping = self._relaxed(rows)
+        undamped_and_damped = np.stack([np.zeros(len(rows)), damping], axis=1)
+        steps = _newton_steps(local.gradient, local.curvature, undamped_and_damped)
+        gains = 0.5 * np.einsum("nki,ni->nk", steps, local.gradient)
+        is_near = gains[:, 0] < tolerance
         self.converged[rows] = is_near
         self.done[rows] = is_near
-        damping = self._relaxed(rows)
-        step = _step(slope, eigen, vectors, damping)
-        self.damping[rows] = damping[:, 0]
-        self.promised[rows] = _half_decrement(slope, eigen + damping)
-        self.ahead[rows] = here + step[:, 0]
+        self.damping[rows] = damping
+        self.promised[rows] = gains[:, 1]
+        self.ahead[rows] = here + _no_longer(steps[:, 1])
         self.arrived[rows] = False
 
     def _relaxed(self, rows: Ints) -> Array:
-        """(m, 1) dampings of the next steps: less where the last step was good, none where they hardly matter."""
+        """(m,) dampings of the next steps: less where the last step was good, none where they hardly matter."""
         damping = self.damping[rows]
         damping = np.where(self.arrived[rows], damping, damping * _RELAX)
         damping[damping < _LEAST_DAMPING] = 0.0
-        return damping[:, None]
+        return damping
 
     def most_promised(self, rows: Ints) -> Array:
         """(n,) densities that rows hardly rise beyond."""
@@ -150,8 +149,7 @@ class _Climbs:
 
     def optimum(self, rows: Ints) -> Optimum:
         """Where rows stand."""
-        curvature = _composed(self.eigen[rows], self.vectors[rows])
-        return Optimum(self.z[rows], self.value[rows], curvature, self.converged[rows])
+        return Optimum(self.z[rows], self.value[rows], self.curvature[rows], self.converged[rows])
 
 
 def climb(
@@ -203,7 +201,7 @@ def climb(
         rows = np.flatnonzero(~climbs.done)
         if not len(rows):
             break
-        local = look(climbs.ahead[rows], rows, climbs.eigen[rows], climbs.vectors[rows])
+        local = look(climbs.ahead[rows], rows, climbs.curvature[rows])
         kept = climbs.gain_enough(rows, local.value)
         here = rows
         if not kept.all():
@@ -254,7 +252,7 @@ def curved(density: Density, found: Optimum, which: Ints | None = None) -> Optim
     before = found.curvature[rows]
     steps = steps_apart(np.einsum("nii->ni", before))
     _, hessian = gradient_and_hessian(density, found.z[rows], which[rows], found.log_density[rows], steps, sides=2)
-    exact = _composed(*_positive(-hessian))
+    exact = _positive(-hessian)
     is_smooth = _log_volume(before) - _log_volume(exact) < _MOST_CURVED
     curvature = found.curvature.copy()
     curvature[rows[is_smooth]] = exact[is_smooth]
@@ -267,44 +265,42 @@ def _log_volume(curvature: Array) -> Array:
     return -0.5 * log_determinant
 
 
-def _damped(
-    density: Density, z: Array, rows: Ints, slope: Array, eigen: Array, vectors: Array
-) -> tuple[Array, Array, Array]:
+def _damped(density: Density, z: Array, rows: Ints, gradient: Array, curvature: Array) -> tuple[Array, Array, Array]:
     """Places (n, d) to which the best of several damped steps leads, the density there, and the dampings (n,)."""
-    trial = z[:, None] + _step(slope, eigen, vectors, _DAMPINGS)
-    tried = density(trial.reshape(-1, z.shape[1]), np.repeat(rows, len(_DAMPINGS))).reshape(len(z), -1)
+    n, d = z.shape
+    dampings = np.tile(_DAMPINGS, (n, 1))
+    steps = _newton_steps(gradient, curvature, dampings)
+    trial = z[:, None] + _no_longer(steps)
+    tried = density(trial.reshape(-1, d), np.repeat(rows, len(_DAMPINGS))).reshape(n, -1)
     best = np.argmax(tried, axis=1)
-    i = np.arange(len(z))
+    i = np.arange(n)
     return trial[i, best], tried[i, best], _DAMPINGS[best]
 
 
-def _half_decrement(slope: Array, eigen: Array) -> Array:
-    """(n,) what a Newton step gains where slopes (n, d) and curvatures (n, d), along its own axes, are right."""
-    with np.errstate(over="ignore"):  # far out, it may gain without bound
-        return 0.5 * (slope**2 / eigen).sum(axis=1)
+def _newton_steps(gradient: Array, curvature: Array, damping: Array) -> Array:
+    """(n, k, d) steps with k dampings (n, k): the more damped, the less far along what is little curved."""
+    identity = np.eye(gradient.shape[1])
+    damped = curvature[:, None] + damping[..., None, None] * identity
+    slope = gradient[:, None, :, None]
+    return np.linalg.solve(damped, slope)[..., 0]
 
 
-def _step(slope: Array, eigen: Array, vectors: Array, damping: Array) -> Array:
-    """(n, k, d) steps with k dampings (n, k) or (k,): the more damped, the less far along what is little curved."""
-    damping = np.broadcast_to(damping, (len(slope), np.shape(damping)[-1]))
-    step = np.einsum("nij,nkj->nki", vectors, slope[:, None] / (eigen[:, None] + damping[..., None]))
-    return step * np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(axis=2, keepdims=True), 1e-300))
+def _no_longer(step: Array) -> Array:
+    """Steps (..., d), shortened where a coordinate would move by more than the longest."""
+    longest = np.abs(step).max(axis=-1, keepdims=True)
+    return step * np.minimum(1.0, _LONGEST / np.maximum(longest, 1e-300))
 
 
-def _composed(eigen: Array, vectors: Array) -> Array:
-    """(n, d, d) symmetric matrices of their eigenvalues and vectors."""
-    return np.einsum("nij,nj,nkj->nik", vectors, eigen, vectors)
-
-
-def _positive(matrices: Array) -> tuple[Array, Array]:
-    """Eigenvalues, made positive, and vectors of symmetric matrices (n, d, d)."""
+def _positive(matrices: Array) -> Array:
+    """The symmetric matrices (n, d, d) with their eigenvalues made positive."""
     eigen, vectors = np.linalg.eigh(matrices)
     size = np.abs(eigen)
     scale = np.maximum(size.max(axis=1, keepdims=True), 1e-8)
-    return np.maximum(size, 1e-9 * scale), vectors
+    eigen = np.maximum(size, _FLATTEST * scale)
+    return np.einsum("nij,nj,nkj->nik", vectors, eigen, vectors)
 
 
-def _by_residuals(residuals: Residuals, z: Array, rows: Ints, *_: Array) -> _Local:
+def _by_residuals(residuals: Residuals, z: Array, rows: Ints, _: Array) -> _Local:
     """Curvature as the expected information, and the gradient, from one more evaluation a coordinate."""
     n, d = z.shape
     points = z[:, None] + _moves(d)
@@ -317,6 +313,8 @@ def _by_residuals(residuals: Residuals, z: Array, rows: Ints, *_: Array) -> _Loc
         one_sided = (values[:, 1:] - here) / _NEAR
         bend = np.einsum("nii->ni", curvature)
         gradient = _finite(one_sided + 0.5 * _NEAR * bend)
+        flattest = _FLATTEST * np.maximum(bend.max(axis=1), 1e-8)
+        curvature += flattest[:, None, None] * np.eye(d)
     return _Local(here[:, 0], gradient, curvature)
 
 
@@ -338,20 +336,17 @@ def _finite(values: Array) -> Array:
     return values if np.isfinite(values.sum()) else np.where(np.isfinite(values), values, 0.0)
 
 
-def _by_differences(density: Density, z: Array, rows: Ints, eigen: Array, vectors: Array) -> _Local:
-    """Curvature and gradient from differences of values alone, as far apart as the last curvature's diagonal suggests.
-
-    Of that, `eigen` (n, d) are the eigenvalues, `vectors` (n, d, d) the vectors.
-    """
+def _by_differences(density: Density, z: Array, rows: Ints, last: Array) -> _Local:
+    """Curvature and gradient from differences of values, as far apart as the last curvatures (n, d, d) suggest."""
     n, d = z.shape
     value = density(z, rows)
     gradient = np.zeros((n, d))
     hessian = np.tile(np.eye(d), (n, 1, 1))
     inside = np.isfinite(value)
     if inside.any():
-        bend = np.einsum("nij,nj->ni", vectors**2, eigen)
-        steps = steps_apart(bend[inside])
+        bend = np.einsum("nii->ni", last[inside])
+        steps = steps_apart(bend)
         slope, bends = gradient_and_hessian(density, z[inside], rows[inside], value[inside], steps, sides=1)
         gradient[inside] = slope
         hessian[inside] = bends
-    return _Local(value, gradient, -hessian)
+    return _Local(value, gradient, _positive(-hessian))
