@@ -20,7 +20,6 @@ class LogPosterior:
 
     def __init__(self, problem: Problem) -> None:
         self.problem, self.coordinates = problem, Transformation(problem)
-        self.log_prior = problem.prior.log_density()
         self.evaluations = 0
         self._rows = max(_LEAST_ROWS, _NUMBERS // sum(s.protocol.mask.size for s in problem.samples))
 
@@ -65,13 +64,14 @@ class LogPosterior:
 
     def sampled_prior(self, theta: Array, z: Array) -> Array:
         """(n,) log prior density of (n, d) sampled coordinates, by the parameters that they stand for."""
-        return self.log_prior(theta) + self.coordinates.log_jacobian(theta, z)
+        residuals = self.coordinates.prior_residuals(theta, z)
+        return self.coordinates.log_prior(theta, z, residuals)
 
     def _standardised(self, z: Array, readings: Any) -> tuple[Array, Array]:
         theta = self.coordinates.to_natural(z)
         with np.errstate(all="ignore"):
-            prior = self.sampled_prior(theta, z)
             residuals = self.coordinates.prior_residuals(theta, z)
+            prior = self.coordinates.log_prior(theta, z, residuals)
         value, left = self.problem.standardised(theta, readings)
         return np.where(np.isfinite(prior), prior + value, -np.inf), np.concatenate([left, residuals])
 

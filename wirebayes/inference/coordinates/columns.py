@@ -38,10 +38,6 @@ class ColumnMap:
     log_spread: Array
 
     @cached_property
-    def _log_scale(self) -> float:
-        return float(np.log(self.scale).sum())
-
-    @cached_property
     def _logarithmic(self) -> tuple[Ints, Array]:
         """Numbers of the positive columns, and the largest value of each."""
         return np.flatnonzero(self.positive), self.most[self.positive]
@@ -62,6 +58,12 @@ class ColumnMap:
             return self.edges[column].score(value)
         return value / self.scale[column]
 
+    def middle(self, median: float, column: int) -> float:
+        """The coordinate of a column's median under its prior."""
+        if self.positive[column]:
+            return float(_log_odds(median, self.most[column]))
+        return 0.0 if column in self.edges else median / float(self.scale[column])
+
     def to_sampled(self, theta: Array) -> Array:
         """(n, d) coordinates of natural parameters (n, d)."""
         z = theta / self.scale
@@ -79,25 +81,6 @@ class ColumnMap:
         for i, at in self.edges.items():
             theta[:, i] = at.value(z[:, i])
         return theta
-
-    def log_jacobian(self, theta: Array, replaced: list[int]) -> Array:
-        """(n,) log |d natural / d sampled|.
-
-        Parameters
-        ----------
-        theta : (n, d) array
-            Natural parameters.
-        replaced : list of int
-            Columns with an edge that have another coordinate in the end.
-        """
-        columns, most = self._logarithmic
-        value = theta[:, columns]
-        log_slopes = np.log(value) + np.log1p(-value / most)
-        total = log_slopes.sum(axis=1) + self._log_scale
-        for i, at in self.edges.items():
-            if i not in replaced:
-                total = total + at.log_slope(theta[:, i])
-        return total
 
 
 def columns_of(problem: Problem) -> ColumnMap:

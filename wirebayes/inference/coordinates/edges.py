@@ -7,51 +7,45 @@ import numpy as np
 from scipy.special import erf, erfc, erfcinv, erfinv, ndtr, ndtri
 
 from wirebayes.numeric.any_distribution import ours
-from wirebayes.numeric.distributions import HalfCauchy, HalfNormal, LogUniform, Normal, TruncatedNormal, Uniform
+from wirebayes.numeric.distributions import HalfCauchy, HalfNormal, LogUniform, TruncatedNormal, Uniform
 from wirebayes.numeric.typing import Array, Function
 
 _NEAREST = 1e-9  # share of the prior between an edge and a value on it, whose score would be infinite
-_log_normal = Normal().log_density()
 
 
 @dataclass(frozen=True)
 class Edge:
-    """A map between values and scores, each (n,), and the log density of the values.
+    """A map between values and scores, each (n,).
 
     Attributes
     ----------
-    score, value, log_prior : function of an array
+    score, value : function of an array
     ends : bool
         Whether the values have an upper end.
     """
 
     score: Function
     value: Function
-    log_prior: Function
     ends: bool
-
-    def log_slope(self, value: Array) -> Array:
-        """(n,) log |d value / d score|."""
-        return _log_normal(self.score(value)) - self.log_prior(value)
 
 
 def edge(distribution: Any) -> Edge | None:
     """The map for halves of a normal and a Cauchy one, a normal cut off below, (log-)uniform ones; none for others."""
     match ours(distribution):
-        case HalfNormal(sd, 0.0) as known:
-            return _half_normal(sd, known.log_density())
-        case HalfCauchy(scale) as known:
-            return _half_cauchy(scale, known.log_density())
+        case HalfNormal(sd, 0.0):
+            return _half_normal(sd)
+        case HalfCauchy(scale):
+            return _half_cauchy(scale)
         case TruncatedNormal() as known:
             return _cut_off(known)
-        case Uniform(low, width) as known:
-            return _uniform(low, width, known.log_density())
+        case Uniform(low, width):
+            return _uniform(low, width)
         case LogUniform() as known:
             return _log_uniform(known)
     return None
 
 
-def _half_normal(sd: float, log_prior: Function) -> Edge:
+def _half_normal(sd: float) -> Edge:
     """Each half from its own tail, where it keeps its digits."""
     unit = sd * np.sqrt(2.0)
 
@@ -67,10 +61,10 @@ def _half_normal(sd: float, log_prior: Function) -> Edge:
         u = np.where(score < 0.0, erfinv(below), erfcinv(above))
         return unit * u
 
-    return Edge(score, value, log_prior, False)
+    return Edge(score, value, False)
 
 
-def _half_cauchy(scale: float, log_prior: Function) -> Edge:
+def _half_cauchy(scale: float) -> Edge:
     """Each half from its own tail, where it keeps its digits."""
 
     def score(value: Array) -> Array:
@@ -85,7 +79,7 @@ def _half_cauchy(scale: float, log_prior: Function) -> Edge:
         u = np.where(score < 0.0, np.tan(0.5 * np.pi * below), 1.0 / np.tan(0.5 * np.pi * above))
         return scale * u
 
-    return Edge(score, value, log_prior, False)
+    return Edge(score, value, False)
 
 
 def _cut_off(known: TruncatedNormal) -> Edge:
@@ -115,17 +109,17 @@ def _cut_off(known: TruncatedNormal) -> Edge:
         found = middle + sd * np.where(score < 0.0, lower, upper)
         return np.maximum(found, end)  # rounding may lead beyond
 
-    return Edge(score, value, known.log_density(), False)
+    return Edge(score, value, False)
 
 
-def _uniform(low: float, width: float, log_prior: Function) -> Edge:
+def _uniform(low: float, width: float) -> Edge:
     def score(value: Array) -> Array:
         return ndtri(np.clip((value - low) / width, _NEAREST, 1.0 - _NEAREST))
 
     def value(score: Array) -> Array:
         return low + width * ndtr(score)
 
-    return Edge(score, value, log_prior, True)
+    return Edge(score, value, True)
 
 
 def _log_uniform(known: LogUniform) -> Edge:
@@ -139,4 +133,4 @@ def _log_uniform(known: LogUniform) -> Edge:
         found = known.low * np.exp(width * ndtr(score))
         return np.minimum(found, known.high)  # rounding may lead beyond
 
-    return Edge(score, value, known.log_density(), True)
+    return Edge(score, value, True)

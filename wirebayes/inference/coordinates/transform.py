@@ -52,6 +52,7 @@ from wirebayes.inference.coordinates.displacement_level import DisplacementLevel
 from wirebayes.inference.coordinates.find_ridges import ridges_of
 from wirebayes.inference.coordinates.first_stretch import FirstStretch, first_stretches
 from wirebayes.inference.coordinates.last_readings import LastReadings, last_readings
+from wirebayes.inference.coordinates.prior_density import PriorDensity
 from wirebayes.inference.coordinates.ridge import Ridge
 from wirebayes.inference.coordinates.slack_edge import SlackEdge, slack_edge
 from wirebayes.inference.coordinates.steps import (
@@ -140,6 +141,7 @@ class Transformation:
         preloads = of_levels | {step.preload for step in means} | {step.preload for step in toes}
         preloads |= {step.edge.preload for step in edges}
         self._own_scale = [*self.shares, *sorted(preloads)]
+        self._prior = PriorDensity.of(problem.prior, self.columns, self.shares)
 
     @property
     def kinds_of_creep(self) -> list[list[int]]:
@@ -165,15 +167,17 @@ class Transformation:
                 step.to_natural(theta, z)
         return theta
 
-    def log_jacobian(self, theta: Array, z: Array) -> Array:
-        """(n,) log |d natural / d sampled|.
+    def log_prior(self, theta: Array, z: Array, residuals: Array) -> Array:
+        """(n,) log prior density of the coordinates.
 
         Parameters
         ----------
         theta, z : (n, d) arrays
             Natural parameters and their coordinates.
+        residuals : (d, n) array
+            Their `prior_residuals`.
         """
-        total = self.columns.log_jacobian(theta, self.shares)
+        total = self._prior(theta, residuals)
         for step in self.steps:
             total = total + step.log_jacobian(theta, z)
         return total
