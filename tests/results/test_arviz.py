@@ -192,7 +192,8 @@ def test_predicted_draws_are_labelled_with_the_parameters_they_were_made_of(
     level = few.posterior_predictive.hold_mean_N[..., 0].values.ravel()
     preload = few.posterior.preload.values.reshape(len(level), -1)[:, 0]
     stiffness = few.posterior.k1.values.ravel()
-    assert np.corrcoef(level, preload * stiffness)[0, 1] > 0.2
+    by_chance = 1.0 / np.sqrt(len(level))
+    assert np.corrcoef(level, preload * stiffness)[0, 1] > 5.0 * by_chance
 
 
 @pytest.mark.parametrize("kind", LOO_KINDS)

@@ -218,8 +218,10 @@ def _may_go_on(amplitude: _Amplitude, profile: Profile) -> bool:
 
 def _with_news(amplitude: _Amplitude, profile: Profile, finer: Array) -> Profile:
     """The profile with further amplitudes; itself where these are known, or no climb at a new one converges."""
-    if np.isin(finer, profile.amplitude).all():
+    is_known = np.isclose(finer[:, None], profile.amplitude, rtol=_ROUNDING, atol=0.0).any(axis=1)
+    if is_known.all():
         return profile
+    finer = finer[~is_known]
     begin = [_between(profile.amplitude, ends.z, profile.best, finer) for ends in profile.ends]
     found = profile.joined(amplitude.climbed(finer, begin)).known()
     return profile if np.array_equal(found.amplitude, profile.amplitude) else found
