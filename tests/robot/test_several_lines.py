@@ -257,3 +257,12 @@ def test_the_next_command_names_every_posterior(fitted, tmp_path, capsys):  # no
     briefly = ["--draws", "5", "--times", "0,60", "--tolerance", "1e-6"]  # a tolerance that is left at once
     assert main(["pose", str(robot), *wires, *briefly, "--output", str(out)]) == 0
     assert f"READINGS.csv {' '.join(wires)}  (when" in capsys.readouterr().out
+
+
+def test_the_stiffness_of_wires_without_a_name_is_refused_with_what_to_write(tmp_path):
+    path = _file(tmp_path)
+    path.write_text(path.read_text().replace("[wires.default]\n", "[wires.default]\nk1_N = 3e4\n"))
+    with pytest.raises(
+        InputError, match=r"wires\.default\.k1_N: found .* expected a name of its own, as \[wires\.belt\]"
+    ):
+        schema.read_robot_file(path)

@@ -262,6 +262,9 @@ def _wires(top: Keys) -> tuple[dict[str, GivenWire], set[str], dict[str, float]]
     for name in tables.table:
         wire = tables.inside(name)
         masses[name] = wire.number("mass_kg_m", default=0.0, least=0)
+        if name == "default" and "k1_N" in wire.table:
+            expected = 'a name of its own, as [wires.belt], and wire = "belt" in every leg that has it'
+            raise wire.complain("k1_N", "the stiffness of legs that name no wire", expected)
         if not _is_fitted(wire, name):
             given[name] = _given_wire(wire)
         wire.finish()

@@ -62,7 +62,8 @@ def wrong(robot: Robot, joint_m: Floats) -> tuple[tuple[int, int], str] | None:
     stretching = overstretched(robot, joint_m)
     if stretching.any():
         whole = "the length of the whole wire, lines x straight + beyond_exit_m"
-        return _first(stretching), f"{whole}: between these lengths no pose stretches every wire by less than 100 %"
+        apart = "between these lengths no pose stretches every wire by less than 100 %; is the robot's file in metres?"
+        return _first(stretching), f"{whole}: {apart}"
     return None
 
 
