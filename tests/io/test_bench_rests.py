@@ -45,3 +45,17 @@ def test_times_of_each_hold_do_not_tell_rests_which_is_said(tmp_path, header, we
     assert [hold.duration_s for hold in made.experiment.holds] == [READ_S[-1]] * 4
     what = "a weight was taken off" if weights else "a hold ended"
     assert any(f"when {what} is not known" in note for note in made.notes)
+
+
+@pytest.mark.parametrize(
+    ("levels", "said"),
+    [([2, 4, 6, 4], ""), ([2, 2, 4, 6], "hold 2 begins only"), ([2, 2, 4, 4, 6], "holds 2 and 4 begin only")],
+)
+def test_a_clock_that_starts_again_where_the_setting_stays_is_warned_of(tmp_path, levels, said):
+    path = tmp_path / "raw.csv"
+    rows = [f"{level},{t},{7 * level - t / 1000:.3f}" for level in levels for t in READ_S]
+    path.write_text("\n".join([HEADERS[0][0], *rows]) + "\n")
+    made = convert(path, About("wire", "line", 1000.0), Choices())
+    assert len(made.experiment.holds) == len(levels)
+    texts = [notice.text for notice in made.warnings if notice.kind == "data"]
+    assert len(texts) == bool(said) and all(said in text for text in texts)

@@ -11,6 +11,7 @@ from math import comb
 import numpy as np
 
 from wirebayes.errors import InputError
+from wirebayes.io.bench.clock_again import clock_started_again
 from wirebayes.io.bench.continuous import COVERED, by_plateaus
 from wirebayes.io.bench.control import BY_CHANCE as TREND_BY_CHANCE
 from wirebayes.io.bench.control import trend_by_chance
@@ -182,7 +183,8 @@ def _cut_into_groups(
         levels = [float(x[rows[0]]) for rows in groups]
     number, numbering = _numbers(readings, groups, levels)
     notes += numbering
-    return Cut(groups, number, levels, times, ends, of_test, notes, readings.time_s)
+    warnings = () if readings.hold is not None else clock_started_again(number, levels, readings.role)
+    return Cut(groups, number, levels, times, ends, of_test, notes, readings.time_s, warnings)
 
 
 def _by_two_clocks(clock: HoldClock | None) -> str:
