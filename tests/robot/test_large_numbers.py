@@ -57,3 +57,6 @@ def test_a_column_hold_is_not_asked_for_where_there_is_one(holds):
     content = {"clock": {"largest_mm": 2.0}, "drift": [{"distance_mm": {"q05": [0.1], "q95": [0.2]}}]}
     (notice,) = _unsure_clock(history, content)
     assert "by up to 2 mm" in notice.text and ("give a column hold" in notice.text) == (holds is None)
+    content["clock"] = {"largest_mm": 0.0, "at_stops_largest_mm": 3.0}
+    (notice,) = _unsure_clock(history, content)
+    assert "by up to 3 mm" in notice.text

@@ -54,10 +54,12 @@ class Corrections(TypedDict):
 
 
 class ClockJson(TypedDict):
-    """How far poses move if the wires' clocks run on instead of starting anew."""
+    """How far poses move if the wires' clocks run on instead of starting anew, or start anew at every stop."""
 
     largest_mm: float
     at_the_end_mm: float
+    at_stops_largest_mm: NotRequired[float]
+    at_stops_at_the_end_mm: NotRequired[float]
 
 
 class DriftOverTime(Drift):

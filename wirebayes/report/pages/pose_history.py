@@ -188,6 +188,10 @@ def _unknown(pose: PoseHistoryJson) -> list[str]:
         "A test cannot show when a moving wire's clock restarts. If it started once and ran on, the pose would "
         f"differ by {_mm(clock['largest_mm'])} mm at most, {_mm(clock['at_the_end_mm'])} mm at the end."
     ]
+    if "at_stops_largest_mm" in clock:
+        largest = _mm(clock["at_stops_largest_mm"])
+        at_the_end = _mm(clock["at_stops_at_the_end_mm"])
+        unknown[0] += f" If it restarted at every stop: {largest} mm at most, {at_the_end} mm at the end."
     exact = "calibration" not in history and not history.get("reference_sd_mm")
     if exact and history["kind"] == "measured":
         unknown.append("Joint values and the robot's geometry are taken to be exact; --reference-sd says otherwise.")

@@ -1,9 +1,8 @@
 """What `pose` answers about a history: where the platform was, its drift, and the joint values that bring it back."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from wirebayes.robot.history.corrections import Target
 from wirebayes.robot.history.doubts import history_warnings, unreached
 from wirebayes.robot.history.estimate import Estimate, estimate_poses
 from wirebayes.robot.history.follow import RESTART, Track, follow_log
-from wirebayes.robot.history.history import History
+from wirebayes.robot.history.history import History, at_every_stop, stated_starts
 from wirebayes.robot.history.tables import correction_table, pose_table, rotation_vectors
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics import rotation as turning
@@ -38,7 +37,11 @@ _SHOWN = 200  # times in pose.json and in pictures; the tables have every row
 _CLOCK_DRAWS = 12  # draws that show how much it matters when the wires' clocks start
 _NEVER_HELD = "No draw of the wires holds the platform at the first row; see --position for where it starts."
 
-_Again = Callable[[WireDraws, float], Track]  # the same history with few draws, whose clocks restart at a share
+
+class _Again(Protocol):
+    """The same history with few draws, whose clocks restart at a share, or as one says that has holds."""
+
+    def __call__(self, few: WireDraws, restart: float, stated: History | None = None, /) -> Track: ...
 
 
 @dataclass(frozen=True)
@@ -112,7 +115,7 @@ def history_report(
             "change_mm": _bands(1e3 * of_winches),
             "left_mm": _bands(1e3 * left),
         },
-        "clock": _clock(line, again),
+        "clock": _clock(line, again, history),
     }
     if history.read:
         content["readings"] = _with_agreement(content["readings"], found)
@@ -154,18 +157,24 @@ class _Asked:
         found = estimate_poses(robot, line, history, self.near, self.errors, rng, progress)
         return found, history.joint_m, partial(self._measured_again, history.joint_m, found.starts_s)
 
-    def _measured_again(self, joint_m: Floats, starts_s: Floats, few: WireDraws, restart: float) -> Track:
+    def _measured_again(
+        self, joint_m: Floats, starts_s: Floats, few: WireDraws, restart: float, stated: History | None = None
+    ) -> Track:
         """With few draws, the same each time, whose clocks start at every hold; once where `restart` is infinite."""
         known = unknowns(self.robot, few, _alike(self.errors), np.random.default_rng(self.seed))
-        starts_s = starts_s if np.isfinite(restart) else starts_s[:1]
+        if stated is not None:
+            starts_s = stated_starts(stated)
+        elif np.isinf(restart):
+            starts_s = starts_s[:1]
         wires, error_m = known.columns(known.draws)
         carried = known.carried(known.draws)
         return follow_log(self.robot, wires, self.history, joint_m, self.near, starts_s, error_m, carried=carried)
 
-    def _commanded_again(self, few: WireDraws, restart: float) -> Track:
+    def _commanded_again(self, few: WireDraws, restart: float, stated: History | None = None) -> Track:
         """With few draws, the same each time, whose clocks start anew at a share `restart` of the mean tension."""
         rng = np.random.default_rng(self.seed)
-        found, _ = commanded.drift_along(self.robot, few, self.history, _alike(self.errors), rng, restart=restart)
+        history = stated or self.history
+        found, _ = commanded.drift_along(self.robot, few, history, _alike(self.errors), rng, restart=restart)
         return found.track
 
 
@@ -295,10 +304,21 @@ def _bands(values: Floats) -> Band:
     }
 
 
-def _clock(line: WireDraws, run: _Again) -> ClockJson:
-    """How far poses move if the wires' clocks start once and run on: no test of holds shows which they do."""
+def _clock(line: WireDraws, run: _Again, history: History) -> ClockJson:
+    """How far poses move if the clocks start once and run on, or anew at every stop: no test of holds shows which."""
     few = line.part(evenly(line.count, _CLOCK_DRAWS))
-    anew, once = run(few, RESTART), run(few, np.inf)
-    apart = np.linalg.norm(anew.position_m - once.position_m, axis=-1)
+    taken = run(few, RESTART)
+    largest_mm, at_the_end_mm = _apart_mm(taken, run(few, np.inf))
+    clock: ClockJson = {"largest_mm": largest_mm, "at_the_end_mm": at_the_end_mm}
+    stops = at_every_stop(history)
+    if stops is not None:
+        largest_mm, at_the_end_mm = _apart_mm(taken, run(few, RESTART, stops))
+        clock |= {"at_stops_largest_mm": largest_mm, "at_stops_at_the_end_mm": at_the_end_mm}
+    return clock
+
+
+def _apart_mm(one: Track, other: Track) -> tuple[float, float]:
+    """The largest distance between two tracks over time, in the median of the draws, and that at the end."""
+    apart = np.linalg.norm(one.position_m - other.position_m, axis=-1)
     middle = np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else np.nan for row in apart.T])
-    return {"largest_mm": 1e3 * float(np.nanmax(middle)), "at_the_end_mm": 1e3 * float(middle[-1])}
+    return 1e3 * float(np.nanmax(middle)), 1e3 * float(middle[-1])

@@ -136,7 +136,8 @@ def _contradicted(history: History, found: Estimate, draws_used: int) -> list[No
 
 def _unsure_clock(history: History, content: PoseHistoryJson) -> list[Notice]:
     """A notice that poses depend on when the wires' clocks restart."""
-    largest_mm = content["clock"]["largest_mm"]
+    clock = content["clock"]
+    largest_mm = max(clock["largest_mm"], clock.get("at_stops_largest_mm", 0.0))
     distance = content["drift"][0]["distance_mm"]
     widths = np.asarray(distance["q95"], float) - np.asarray(distance["q05"], float)
     if not largest_mm > 0.5 * np.max(widths, initial=0.0, where=np.isfinite(widths)):

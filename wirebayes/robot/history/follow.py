@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
-from wirebayes.robot.history.history import History, divided
+from wirebayes.robot.history.history import History, divided, stated_starts
 from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion.creep import CreepState, fresh
@@ -172,9 +172,7 @@ def clock_starts(history: History, tension_N: Floats, share: float = RESTART) ->
     """
     times = history.times_s
     if history.hold is not None and np.isfinite(share):
-        new = np.diff(history.hold) != 0
-        begins = np.concatenate([[True], new])
-        return times[begins]
+        return stated_starts(history)
     starts = [float(times[0])]
     reference = tension_N[0]
     for k in range(1, len(times)):

@@ -98,6 +98,32 @@ def divided(history: History, pieces: Indices) -> tuple[History, Indices]:
     return fine, kept
 
 
+def at_every_stop(history: History) -> History | None:
+    """The history with clocks that start at every stop and load; None where it says when they do, or has neither."""
+    if history.hold is not None:
+        return None
+    values = history.joint_m
+    if values is None:
+        assert history.position_m is not None and history.rotation is not None
+        turned = history.rotation.reshape(len(history.times_s), -1)
+        values = np.column_stack([history.position_m, turned])
+    stays = (values[1:] == values[:-1]).all(axis=1)
+    arrives = ~stays[:-1] & stays[1:]
+    loads = np.column_stack([history.payload_kg, history.payload_m])
+    is_loaded = (loads[1:] != loads[:-1]).any(axis=1)
+    begins = np.concatenate([[False], is_loaded])
+    begins[1:-1] |= arrives
+    return replace(history, hold=np.cumsum(begins)) if begins.any() else None
+
+
+def stated_starts(history: History) -> Floats:
+    """The times at which holds begin that a history states, the first row's first."""
+    assert history.hold is not None
+    new = np.diff(history.hold) != 0
+    begins = np.concatenate([[True], new])
+    return history.times_s[begins]
+
+
 def with_payload(robot: Robot, mass_kg: float, centre_m: Floats) -> Robot:
     """The robot with a payload on its platform: the mass grows, its centre moves.
 
