@@ -12,7 +12,9 @@ from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.winches import turned_by
 from wirebayes.robot.motion import inverse
+from wirebayes.robot.self_calibration.by_points import by_points, swing
 from wirebayes.robot.self_calibration.equations import EXACT, Equations, Holds, Noise, State, moved, pulled
+from wirebayes.robot.self_calibration.internal_tensions import without_carried
 from wirebayes.robot.self_calibration.strain import Grown, Stretch, stretch
 from wirebayes.robot.self_calibration.unknowns import Parts, Unknowns, one_after_another
 
@@ -79,6 +81,8 @@ def _empty(unknowns: Unknowns, holds: Holds) -> Equations:
     """Equations of which nothing is written yet."""
     robot = unknowns.robot
     counts = {"loop": robot.legs, "balance": robot.degrees, "tension": robot.legs, "pose": robot.degrees}
+    if unknowns.errors.level_N > 0:
+        counts["carried"] = robot.degrees
     if holds.tilt is not None:
         counts["tilt"] = 2
     shape = len(holds.session.duration_s), sum(counts.values())
@@ -195,7 +199,7 @@ def _loops_by_wires(out: Equations, about: _About, lengths: _Lengths, creep: Gro
 def _loops_by_points(out: Equations, about: _About) -> None:
     along = batch_first(about.shape.direction).mT * about.here.lines[:, None]  # (p, w, 3)
     by_platform = np.einsum("pwi,pij->pwj", along, about.state.rotation)
-    _points(out.by_robot[:, out.rows["loop"]], about.unknowns, -along, by_platform)
+    by_points(out.by_robot[:, out.rows["loop"]], about.unknowns, -along, by_platform)
 
 
 def _loops_by_drum(out: Equations, unknowns: Unknowns, lengths: _Lengths) -> None:
@@ -250,58 +254,8 @@ def _balance(out: Equations, about: _About) -> None:
 def _balance_by_points(out: Equations, about: _About, pull: Floats, force: float) -> None:
     """Slopes of the balance, in units of a force, by the points at which wires pull."""
     unit = about.here.edge_scale[:, None, None]
-    by_exit, by_platform = _swing(about.here, about.shape, about.state.rotation, pull)
-    _points(out.by_robot[:, out.rows["balance"]], about.unknowns, by_exit * unit / force, by_platform * unit / force)
-
-
-def _points(out: Floats, unknowns: Unknowns, by_exit: Floats, by_platform: Floats) -> None:
-    """Slopes by exit and platform points, where these are unknown.
-
-    `by_exit` and `by_platform` are ``(p, w, 3)`` of equations that speak of one leg each, or ``(p, d, w, 3)``.
-    """
-    errors = unknowns.errors
-    leg = np.arange(unknowns.robot.legs)
-    for name, slope, sd in (("exit", by_exit, errors.exit_m), ("platform", by_platform, errors.platform_m)):
-        at = unknowns.slices[name]
-        if at.stop == at.start:
-            continue
-        scaled = slope * sd
-        if slope.ndim == 3:
-            first = at.start + 3 * leg
-            for axis in range(3):
-                out[:, leg, first + axis] = scaled[..., axis]
-        else:
-            out[:, :, at] = scaled.reshape(*slope.shape[:2], -1)
-
-
-def _swing(robot: Robot, shape: statics.Geometry, rotation: Floats, pull: Floats) -> tuple[Floats, Floats]:
-    """How the wires' pull on the platform changes when a point moves: ``(p, d, w, 3)`` by exit and platform points."""
-    tau = (pull * robot.lines).T  # (w, p)
-    turn = _turn_of_pull(shape, tau)
-    by_line = np.moveaxis(turn, 1, 2)  # (p, 3, w, 3)
-    by_arm = np.zeros_like(by_line)
-    if robot.degrees == 6:
-        direction = batch_first(shape.direction).mT
-        arm = turns.cross_matrix(batch_first(shape.arm_m).mT)  # (p, w, 3, 3)
-        pulls = turns.cross_matrix(direction * tau.T[..., None])
-        moment_by_line = np.moveaxis(arm @ turn, 1, 2)
-        moment_by_arm = np.moveaxis(-pulls, 1, 2)
-        by_line = np.concatenate([by_line, moment_by_line], 1)
-        by_arm = np.concatenate([by_arm, moment_by_arm], 1)
-    by_platform = np.einsum("pdwi,pij->pdwj", by_line + by_arm, rotation)
-    return -by_line, by_platform
-
-
-def _turn_of_pull(shape: statics.Geometry, tau: Floats) -> Floats:
-    """(p, w, 3, 3) change of forces ``(w, p)`` along the wires when their platform points move."""
-    by_length = tau / shape.straight_m
-    u = batch_first(shape.direction)  # (p, 3, w)
-    turn = by_length.T[..., None, None] * np.eye(3)
-    turn = turn - np.einsum("wp,piw,pjw->pwij", by_length, u, u)
-    if shape.over is not None:
-        side = batch_first(shape.over.across)
-        turn = turn + np.einsum("wp,piw,pjw->pwij", tau * shape.over.swing_1_m, side, side)
-    return turn
+    by_exit, by_platform = swing(about.here, about.shape, about.state.rotation, pull)
+    by_points(out.by_robot[:, out.rows["balance"]], about.unknowns, by_exit * unit / force, by_platform * unit / force)
 
 
 def _tensions(out: Equations, about: _About) -> None:
@@ -317,6 +271,8 @@ def _tensions(out: Equations, about: _About) -> None:
     by_pull = np.where(read, taut / sd_N, 1.0 / pull_N)
     out.by_hold[:, rows.start + leg, about.here.degrees + leg] = by_pull
     _tensions_by_robot(out, about, read)
+    if about.unknowns.errors.level_N > 0:
+        without_carried(out, about.unknowns, about.here, about.shape, about.state.rotation, ~read)
 
 
 def _off_reading(about: _About, pull: Floats) -> Floats:

@@ -38,8 +38,7 @@ def trust(found: RobotPosterior) -> float:
     unread = _unread(found)
     if not unread.any() or lengths_tell(found.unknowns, ~unread):
         return p
-    free = unread.sum() - _taken_up(found)
-    tensions = float(chdtrc(max(free, 1.0), _beyond_usual(found)))
+    tensions = _outside_range(found)
     return min(1.0, 2.0 * p, _TESTS * tensions, _TESTS * _usual_noise(found))  # p has the better of two tests times two
 
 
@@ -71,15 +70,32 @@ def _joint_probability(found: RobotPosterior) -> float:
 
 def _taken_up(found: RobotPosterior) -> float:
     """Degrees of freedom that the unknowns take up of the tensions that nobody read."""
-    of_tensions = leverage(found, found.equations.rows["tension"])
-    return float(of_tensions[_unread(found)].sum())
+    e = found.equations
+    of_tensions = leverage(found, e.rows["tension"])[_unread(found)]
+    carried = leverage(found, e.rows["carried"]) if "carried" in e.rows else np.zeros(1)
+    return float(of_tensions.sum() + carried.sum())
 
 
 def _beyond_usual(found: RobotPosterior) -> float:
     """Squared residuals, summed, of tensions that nobody read about what is usual."""
-    of_tensions = found.equations.residual[:, found.equations.rows["tension"]]
-    usual = of_tensions[_unread(found)]
-    return float((usual**2).sum())
+    e = found.equations
+    usual = e.residual[:, e.rows["tension"]][_unread(found)]
+    carried = e.residual[:, e.rows["carried"]] if "carried" in e.rows else np.zeros(1)
+    return float((usual**2).sum() + (carried**2).sum())
+
+
+def _outside_range(found: RobotPosterior) -> float:
+    """Probability of tensions, those that nobody read, as far from each wire's own level and that from what is usual.
+
+    Of all of them: those that carry the platform leave the file's range, too, where geometry is wrong.
+    """
+    unread = _unread(found)
+    unit_N = found.noise.pull_N
+    off = np.where(unread, found.state.pull_N - found.noise.usual_N, 0.0) / unit_N
+    scale = found.unknowns.errors.level_N / unit_N
+    level = scale * off.sum(0) / (1.0 + scale**2 * unread.sum(0))
+    left = (off - scale * level)[unread]
+    return float(chdtrc(unread.sum(), (left**2).sum() + (level**2).sum()))
 
 
 def _unread(found: RobotPosterior) -> Bools:
