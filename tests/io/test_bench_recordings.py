@@ -410,3 +410,19 @@ def test_cycles_are_a_hold_without_readings_where_the_wire_pulls_as_in_their_mea
     written = wb.read_experiments(tmp_path / "out" / "wire.toml")[0]
     assert [h.setting for h in written.holds] == [h.setting for h in imported.experiments[0].holds]
     assert [h.duration_s for h in written.holds] == pytest.approx(durations)
+
+
+def test_cycles_under_which_the_wire_creeps_count_from_where_it_first_pulled(tmp_path):
+    """The mean of what is read falls as it creeps; a hold of the same creep begins where the wire first pulled so."""
+    way = np.linspace(0.0, 4.0, 41)
+    cycles = np.tile(np.concatenate([way, way[-2:0:-1]]), 10)
+    x = np.concatenate([np.zeros(10), cycles, np.linspace(0.0, 2.0, 21), np.full(900, 2.0), np.full(900, 3.0)])
+    crept = np.minimum(np.maximum(np.arange(len(x)) - 10, 0) / len(cycles), 1.0) * 0.4
+    rows = [
+        f"{0.5 * i},{place:.4f},{5.0 * (place - e) + 10.0:.4f}"
+        for i, (place, e) in enumerate(zip(x, crept, strict=True))
+    ]
+    path = tmp_path / "raw.csv"
+    path.write_text("t (s),x (mm),F (N)\n" + "\n".join(rows))
+    (stated,) = convert(path, About("wire", "line", 1000.0), Choices()).unrecorded
+    assert stated["displacement_mm"] == pytest.approx(1.8, abs=0.03)

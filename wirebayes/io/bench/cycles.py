@@ -41,7 +41,7 @@ def cycles_before(readings: Readings, before_hold: int, left: int, turn: int, en
     sentence = (
         f"before hold {before_hold} the {role} went to and fro between {short(low, 4)} and {short(high, 4)} {unit} for "
         f"{lasts}: what the wire crept meanwhile is that of a hold without readings at {short(setting, 4)} {unit}, "
-        "where it pulls as in the mean of the cycles"
+        "where it first pulled as in the mean of the cycles"
     )
     rounded = float(f"{setting:.6g}")
     return Cycles(before_hold, rounded, begin_s, end_s, sentence)
@@ -64,9 +64,10 @@ def _equivalent(readings: Readings, begin: int, turn: int, end_s: float) -> floa
     setting = _mean(readings.setting[rows], time)
     read = readings.read[rows]
     taut = read > TAUT * read.max()
-    if readings.role == "tension" or taut.all() or taut.sum() < 2 or np.ptp(read[taut]) == 0.0:
+    first = taut & (np.arange(len(read)) <= read.argmax())  # before it crept: the hold begins so, too
+    if readings.role == "tension" or first.sum() < 2 or np.ptp(read[first]) == 0.0:
         return setting
-    slope, at_zero = np.polyfit(read[taut], readings.setting[rows][taut], 1)
+    slope, at_zero = np.polyfit(read[first], readings.setting[rows][first], 1)
     return float(at_zero + slope * _mean(read, time))
 
 
