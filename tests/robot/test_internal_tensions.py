@@ -1,9 +1,11 @@
 """Tensions that nobody read: what is usual is said of internal tension, and little of what carries the platform."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from tests.robot import drawn
 from wirebayes.robot.mechanics import rotation as turns
@@ -11,6 +13,7 @@ from wirebayes.robot.self_calibration.equations import Holds, Noise, State
 from wirebayes.robot.self_calibration.holds_creep import creep_of
 from wirebayes.robot.self_calibration.internal_tensions import _CARRIED
 from wirebayes.robot.self_calibration.linearisation import linearised
+from wirebayes.robot.self_calibration.residuals import _outside_range
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
 
@@ -107,3 +110,25 @@ def _moved(one, move):
     position[1] += move[:3]
     turn[1] = turns.matrix(move[None, 3:] / one.robot.size_m)[0] @ turn[1]
     return replace(one.state, position_m=position, rotation=turn)
+
+
+def test_tensions_far_outside_the_range_are_improbable_whatever_they_carry():
+    """Each wire's have a level in common, so that its covariance is I + l^2 1 1'; what was read is not asked."""
+    rng = np.random.default_rng(5)
+    unit_N, level_N, usual_N = 2.0, 3.0, 1.0
+    known = np.zeros((6, 3), bool)
+    known[1, 2] = True
+    pull = usual_N + rng.normal(size=(6, 3)) * np.array([1.0, 4.0, 7.0])
+    pull[known] = 1e6
+    squares = 0.0
+    for wire in range(3):
+        off = (pull[:, wire] - usual_N)[~known[:, wire]] / unit_N
+        covariance = np.eye(len(off)) + (level_N / unit_N) ** 2
+        squares += off @ np.linalg.solve(covariance, off)
+    found = SimpleNamespace(
+        equations=SimpleNamespace(rows={"tension": slice(0, 3)}, known=known),
+        state=SimpleNamespace(pull_N=pull),
+        noise=SimpleNamespace(pull_N=unit_N, usual_N=usual_N),
+        unknowns=SimpleNamespace(errors=SimpleNamespace(level_N=level_N)),
+    )
+    assert _outside_range(found) == pytest.approx(chi2.sf(squares, 17))
