@@ -14,7 +14,7 @@ from wirebayes.io.next_hold import NEXT_HOLD, write_next_hold
 from wirebayes.io.readings import protocol_holds, protocol_table
 
 FEW = wb.Policy(walkers=32, ess=300, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
-JOINT = replace(FEW, most_steps=240)  # several tests together take more steps to agree
+JOINT = replace(FEW, round_draws=4096, most_steps=400)  # several tests together: a better proposal, and more steps
 
 
 def one_test(**options: Any) -> wb.Experiment:

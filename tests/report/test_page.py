@@ -95,8 +95,10 @@ def read(path: Path) -> Reader:
 
 
 def said_twice(words: str) -> set[str]:
-    """Runs of nine words that stand in two sentences of a page."""
-    lines = [line.split() for line in re.split(r"\n|(?<=[.;:]) ", words)]
+    """Runs of nine words that stand in two sentences of a page; two parameters may be known equally well by chance."""
+    of_one_parameter = re.compile("it is correlated with|interval spans a factor of")
+    sentences = re.split(r"\n|(?<=[.;:]) ", words)
+    lines = [sentence.split() for sentence in sentences if not of_one_parameter.search(sentence)]
     each = [{" ".join(line[i : i + 9]) for i in range(len(line) - 8)} for line in lines]
     found = set[str]()
     for i, runs in enumerate(each):
