@@ -24,7 +24,7 @@ from wirebayes.wire.effect import Effect
 LARGEST = 40.0
 _FARTHER = np.array([1.3, 1.7, 2.3])  # times an end's distance from neutral, where the top lies at an end
 _OUTWARD = 6  # times that the grid may grow outwards so: 150-fold in all
-_ROUNDING = 1e-9  # of a reach, which a grid may end on
+_ROUNDING = 1e-9  # of a reach, which a grid may end on, and of amplitudes that are one and the same
 # δ of the first amplitudes tried, doubling up to `LARGEST`; around the best the grid is refined later. The scan's unit
 # may be too large where the parameters bend themselves to the effect, so that it begins below what could be seen.
 _DELTAS = np.array([0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0])

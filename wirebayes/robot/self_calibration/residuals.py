@@ -6,7 +6,7 @@ from scipy.special import chdtrc, fdtrc
 from wirebayes.numeric.means import root_mean_square
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.self_calibration.equations import EXACT, FRICTIONLESS, Holds
+from wirebayes.robot.self_calibration.equations import EXACT, FRICTIONLESS, Equations, Holds
 from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, joint_test
 from wirebayes.robot.self_calibration.unknowns import Unknowns
@@ -72,7 +72,7 @@ def _taken_up(found: RobotPosterior) -> float:
     """Degrees of freedom that the unknowns take up of the tensions that nobody read."""
     e = found.equations
     of_tensions = leverage(found, e.rows["tension"])[_unread(found)]
-    carried = leverage(found, e.rows["carried"]) if "carried" in e.rows else np.zeros(1)
+    carried = leverage(found, _carried(e))
     return float(of_tensions.sum() + carried.sum())
 
 
@@ -80,8 +80,13 @@ def _beyond_usual(found: RobotPosterior) -> float:
     """Squared residuals, summed, of tensions that nobody read about what is usual."""
     e = found.equations
     usual = e.residual[:, e.rows["tension"]][_unread(found)]
-    carried = e.residual[:, e.rows["carried"]] if "carried" in e.rows else np.zeros(1)
+    carried = e.residual[:, _carried(e)]
     return float((usual**2).sum() + (carried**2).sum())
+
+
+def _carried(equations: Equations) -> slice:
+    """Rows of what the tensions that nobody read carry; none where nothing is usual of tensions."""
+    return equations.rows.get("carried", slice(0, 0))
 
 
 def _outside_range(found: RobotPosterior) -> float:

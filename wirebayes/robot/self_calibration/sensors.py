@@ -196,8 +196,11 @@ def _perhaps(screened: Suspects) -> list[int]:
 def _compared(screened: Suspects, found: RobotPosterior, gain: float, each: dict[int, _Errors]) -> Suspects:
     """What likelihoods say: what errors of all sensors gain, and that of each that was tried alone."""
     w = len(screened.bias_N)
-    bias, sd = screened.bias_N.copy(), screened.sd_N.copy()
-    share, p_alone, suffices = np.zeros(w), np.zeros(w), np.zeros(w, bool)
+    bias = screened.bias_N.copy()
+    sd = screened.sd_N.copy()
+    share = np.zeros(w)
+    p_alone = np.zeros(w)
+    suffices = np.zeros(w, bool)
     for i, one in each.items():
         own = _gain(found, one.found)
         bias[i] = one.bias_N[i]
