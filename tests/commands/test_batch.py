@@ -82,6 +82,7 @@ def test_a_row_and_a_folder_for_each_experiment(reference, tests):
                 assert float(row[f"{name}_{quantity}"]) == values[quantity]
         assert (reference / row["name"] / "posterior.nc").is_file()
         assert (row["material"], row["file"], float(row["length_mm"]), row["error"]) == ("line", "lot.toml", 1000.0, "")
+        assert row["control"] == "displacement"
     many = wb.load(reference)
     assert list(many.plain) == [test.name for test in tests]
     assert many.final == {}

@@ -41,6 +41,20 @@ def test_length_is_no_reason_to_lie_apart():
     assert not outliers([*lot(6), *(row(f"long{i}", 1000.0 + i, length=3000.0) for i in range(6))])
 
 
+def on_a_bench(name, control, sensor_sd):
+    specimen = row(name, 1000.0)
+    error = {"q05": 0.9 * sensor_sd, "q50": sensor_sd, "q95": 1.1 * sensor_sd}
+    return {**specimen, "control": control, "parameters": {**specimen["parameters"], "sensor_sd": error}}
+
+
+def test_a_sensor_that_reads_millimetres_is_not_compared_with_those_that_read_newtons():
+    steps = [on_a_bench(f"s{i}", "displacement", 0.02) for i in range(12)]
+    weights = [on_a_bench(f"w{i}", "force", 3.0) for i in range(6)]
+    assert not outliers([*steps, *weights])
+    (found,) = outliers([*steps, *weights, on_a_bench("odd", "displacement", 3.0)])
+    assert (found["experiment"], found["parameter"], found["specimens"]) == ("odd", "sensor_sd", 13)
+
+
 def test_few_specimens_and_failed_ones_are_passed_over():
     failed = {"name": "f", "material": "line", "length_mm": 1.0, "parameters": {}}
     assert not outliers([*lot(4), row("odd", 9000.0), failed])

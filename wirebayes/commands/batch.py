@@ -48,7 +48,7 @@ _ROW = "row.json"  # an experiment's row, written behind all its other files: wi
 _SCRATCH = ".computing"
 _LISTED = 5  # unreadable files named in an error: as many as a person mends at once
 _TRIES = 3  # times that a dead process may take the others of its pool with it; more is no accident
-_FIRST = ("name", "material", "file", "length_mm", "holds", "readings", "converged")
+_FIRST = ("name", "material", "file", "length_mm", "control", "holds", "readings", "converged")
 _LAST = ("verdict", "effects", "best_effect", "p_global", "check", "outlier", "warnings", "error")
 
 Sources = PathLike | Experiment | Iterable[PathLike | Experiment]

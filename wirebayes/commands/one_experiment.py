@@ -124,6 +124,7 @@ def first_columns(experiment: Experiment, file: str) -> Row:
         **empty_row(experiment.name, file),
         "material": experiment.material,
         "length_mm": experiment.length_mm,
+        "control": experiment.control,
         "holds": len(recorded),
         "readings": readings,
     }
@@ -136,6 +137,7 @@ def empty_row(name: str, file: str) -> Row:
         "material": None,
         "file": file,
         "length_mm": None,
+        "control": None,
         "holds": None,
         "readings": None,
         "converged": None,

@@ -38,12 +38,17 @@ class DiscoveryColumns(FitColumns):
 
 
 class Row(DiscoveryColumns):
-    """One experiment; None where nothing was fitted or looked for."""
+    """One experiment; None where nothing was fitted or looked for.
+
+    `control` says which units the parameters of the bench have: ``sensor_sd`` is in N where displacements are set, and
+    in mm where tensions are.
+    """
 
     name: str
     material: str | None
     file: str
     length_mm: float | None
+    control: str | None
     holds: int | None
     readings: int | None
     error: str | None

@@ -4,8 +4,10 @@ A robust z: the distance of a specimen's posterior median from the median of all
 the expected distance, which combines the spread of the specimens (from the median absolute deviation) and the width of
 this specimen's posterior. Neither a few outliers nor one badly determined specimen affects it much.
 
-B and k2 are compared at the typical tension and after the typical hold of the material's tests: how far specimens of
-other exponents lie apart in the creep at one newton depends on what is called a newton.
+What belongs to the bench, such as the error of its sensor, is compared among tests by steps, and among tests under
+weights: one bench reads tensions, the other displacements. B and k2 are compared at the typical tension and after the
+typical hold of the material's tests: how far specimens of other exponents lie apart in the creep at one newton depends
+on what is called a newton.
 """
 
 from collections.abc import Iterable, Sequence
@@ -15,6 +17,7 @@ from scipy.special import stdtrit
 
 from wirebayes.json_files.batch import OutlierRow, Row
 from wirebayes.json_files.values import INTERVAL, Quantiles
+from wirebayes.model.sample import SAMPLE
 from wirebayes.numeric.typing import Array
 from wirebayes.sentences import short
 
@@ -44,11 +47,12 @@ def outliers(rows: Iterable[Row]) -> list[OutlierRow]:
     found: list[OutlierRow] = []
     for material, members in materials.items():
         parameters = len(members[0]["parameters"])
-        with_parameter: dict[str, list[Row]] = {}
+        comparable: dict[tuple[str, str | None], list[Row]] = {}
         for row in members:
             for name in row["parameters"]:
-                with_parameter.setdefault(name, []).append(row)
-        for name, specimens in with_parameter.items():
+                bench = row.get("control") if name in SAMPLE else None
+                comparable.setdefault((name, bench), []).append(row)
+        for (name, _), specimens in comparable.items():
             if len(specimens) >= LEAST_SPECIMENS:
                 limit = threshold(len(specimens), parameters)
                 found += _far_off(material, name, specimens, limit)
