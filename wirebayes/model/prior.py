@@ -95,7 +95,10 @@ class Prior:
 
     def known_draws(self, n: int, rng: np.random.Generator) -> Array:
         """(n, d) the same draws, of what the distributions are of."""
-        return np.column_stack([d.rvs(size=n, random_state=rng) for d in self.distributions.values()])
+        known = np.empty((n, len(self.distributions)))
+        for i, distribution in enumerate(self.distributions.values()):
+            known[:, i] = distribution.rvs(size=n, random_state=rng)
+        return known
 
     def named_draws(self, n: int, rng: np.random.Generator) -> dict[str, Array]:
         """(n,) draws of every parameter, fixed ones included."""

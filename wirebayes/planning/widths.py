@@ -35,6 +35,7 @@ _KEPT = 400  # draws that are handed on of a posterior
 _NUMBERS = 4_000_000  # draws times readings at once, so that a long protocol does not fill the memory
 _WIDER = 1.4  # times as wide as the posterior is found to be: weights in its tails stay small
 _LEAST = 1e-6  # of the covariance before, so that a round in which one draw has all the weight can be drawn from
+_SHARE = 1e-9  # of the weight: no fit would draw what has less, and its creep may be infinite
 _DEGREES = 4.0  # of the Student t: its tails cover those of a posterior near its mode
 
 
@@ -263,8 +264,9 @@ def _weighted(target: LogPosterior, z: Array, covariance: Array, y: Array, rng: 
         theta = to_natural(flat)
     # a draw without weight stands for the mode: infinity times nothing would be no number
     modes = np.repeat(to_natural(z), _DRAWS[-1], axis=0)
-    counts = weight.reshape(-1, 1) > 0
-    return np.where(counts, theta, modes), weight
+    counts = weight > _SHARE
+    counted = np.where(counts, weight, 0.0)
+    return np.where(counts.reshape(-1, 1), theta, modes), counted / counted.sum(axis=1, keepdims=True)
 
 
 def _moments(points: Array, weight: Array) -> tuple[Array, Array]:
