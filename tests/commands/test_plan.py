@@ -250,3 +250,66 @@ def test_a_plan_under_weights_refuses_what_only_steps_have(tmp_path):
         wb.plan(path)
     with pytest.raises(wb.InputError, match="--weights: found -1, expected more than 0 N"):
         wb.simulate_tests(weights=[1, -1])
+
+
+BOTH = """[guess]
+k1 = 90000.0
+B = 0.002
+U = 0.9
+k2 = 0.05
+N = 0.8
+[[protocol]]
+name = "steps"
+length_mm = 1000.0
+step_mm = 4.0
+holds = 4
+hold_s = 600.0
+[[protocol]]
+name = "weights"
+length_mm = 1000.0
+control = "force"
+step_N = 360.0
+holds = 4
+hold_s = 600.0
+resolution_mm = 0.01
+"""
+
+
+def test_steps_and_weights_in_one_plan_each_have_the_errors_of_their_own_bench(tmp_path):
+    head, steps, weights = BOTH.split("[[protocol]]")
+    plans = {"both": BOTH, "turned": f"{head}[[protocol]]{weights}[[protocol]]{steps}"}
+    plans |= {"steps": f"{head}[[protocol]]{steps}", "weights": f"{head}[[protocol]]{weights}"}
+    spread = {}
+    for name, text in plans.items():
+        path = tmp_path / f"{name}.toml"
+        path.write_text(text)
+        for row in wb.plan(path, tests=10, output=tmp_path / name).summary()["protocols"]:
+            spread[name, row["name"]] = row["parameters"]["sensor_sd"]["guess_sd"]
+            assert row["creep"]["creep_1h_mm"]["sd"] < 1.0  # draws of next to no weight creep by 0 times infinity
+    for control in ("steps", "weights"):
+        for plan in ("both", "turned"):
+            ratio = spread[plan, control] / spread[control, control]
+            assert 0.1 < ratio < 10.0  # other draws; newtons taken for millimetres are 90 times as many
+
+
+@pytest.mark.parametrize(
+    ("plan", "key"),
+    [
+        (BOTH.replace("U = 0.9", "sensor_sd = 0.02"), r"line 4, key guess\.sensor_sd"),
+        (f"{BOTH}[prior]\nsetting_sd = {{ fixed = 0.1 }}\n", r"key prior\.setting_sd"),
+    ],
+)
+def test_an_error_without_one_unit_is_refused(tmp_path, plan, key):
+    path = tmp_path / "plan.toml"
+    path.write_text(plan)
+    with pytest.raises(wb.InputError, match=f"{key}: found one number for tests by steps and for tests under weights"):
+        wb.plan(path)
+
+
+def test_a_guess_of_numbers_alone_is_one(tmp_path):
+    path = tmp_path / "plan.toml"
+    numbers = "\n".join(f"{name} = {value}" for name, value in HUNG.items())
+    path.write_text(f"[guess]\n{numbers}\n[[protocol]]{BOTH.split('[[protocol]]')[1]}")
+    (row,) = wb.plan(path, tests=10, output=tmp_path / "out").summary()["protocols"]
+    k1 = row["parameters"]["k1"]
+    assert k1["guess_sd"] < 1e-9 < k1["sd"]

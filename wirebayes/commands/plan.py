@@ -164,7 +164,7 @@ def _judged(request: PlanRequest, kinds: Kinds, spec: ModelSpec, seed: int, repo
     """What each test would teach, and what it would show of missing effects."""
     planned = []
     for test, words in request.tests:
-        guess = request.guess.at(test.length_mm)
+        guess = request.guess.at(test)
         planned.append((at_centre(test, guess, spec), words))
     first, _ = planned[0]
     stated = {  # all state their creep for the same wire
@@ -175,7 +175,7 @@ def _judged(request: PlanRequest, kinds: Kinds, spec: ModelSpec, seed: int, repo
     judged = []
     for done, (test, words) in enumerate(planned):
         report("protocols", done, len(planned))
-        guess = request.guess.at(test.length_mm)
+        guess = request.guess.at(test)
         own_seed = seed_of(seed, "plan", test.name)
         rng = np.random.default_rng(own_seed)
         try:
@@ -237,7 +237,8 @@ def _of_plan(file: PlanFile, name: str | None, n: int, kinds: Kinds, own: Path |
     if file.posterior is None:
         guess = from_tables(file.guess, file.guess_lines, file.source, planned, n, rng)
     else:
-        guess, about, _ = _posterior(file.posterior, name, n, own)
+        earlier, about, _ = _posterior(file.posterior, name, n, own)
+        guess = earlier.on_benches_of(planned, rng)
     about["guess"] = file.guess
     about["priors"] = file.priors
     about["material"] = file.material
@@ -277,7 +278,7 @@ def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tupl
     length_mm = sample.protocol.length_mm
     source = f"the posterior of {sample.name} in {folder.name}"
     guess = from_posterior(stored.draws, length_mm, source, n)
-    guess = replace(guess, doubts=stored.doubts)
+    guess = replace(guess, doubts=stored.doubts, control=sample.protocol.control)
     about = {"posterior": hash_of(guess.draws)}
     return guess, about, sample
 

@@ -1,7 +1,7 @@
 """A plan, read from TOML: tests that could be done, a guess of the wire, and the aim."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -137,6 +137,7 @@ def read_plan(path: Path, effects: Sequence[str] = ()) -> PlanFile:
         robot = str(path.parent / robot)
     material = top.string("material", "a name", "line")
     priors = top.priors()
+    _check_units(top, tests, {"guess": guess, "prior": priors})
     return PlanFile(
         path,
         tuple(tests),
@@ -150,6 +151,17 @@ def read_plan(path: Path, effects: Sequence[str] = ()) -> PlanFile:
         robot,
         _aim(top, effects),
     )
+
+
+def _check_units(top: Keys, tests: Sequence[PlannedTest], stated: Mapping[str, Mapping[str, Any]]) -> None:
+    """Refuse an error of the bench that would be in N for some of the tests, and in mm for others."""
+    if len({test.control for test in tests}) < 2:
+        return
+    for table, values in stated.items():
+        for name in ("sensor_sd", "setting_sd"):
+            if name in values:
+                found = "one number for tests by steps and for tests under weights, where its units differ"
+                raise top.complain(f"{table}.{name}", found, "none, or tests of one kind")
 
 
 def _planned(keys: Keys, index: int) -> PlannedTest:

@@ -1,10 +1,11 @@
 """Draws of the wire's parameters guessed before a test: from a plan's tables, an earlier fit, or readings."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.random import Generator
 
 from wirebayes.inference.laplace_fit import fitted
@@ -18,6 +19,7 @@ from wirebayes.model.spec import ModelSpec
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Array
 from wirebayes.result_warnings import Notice
+from wirebayes.wire.protocol import Control
 
 
 @dataclass(frozen=True)
@@ -27,24 +29,47 @@ class GuessedWire:
     Attributes
     ----------
     draws : dict of name to (n,) array
-        Parameters of the plain model.
+        Parameters of the plain model, those of the bench as in tests of `control`.
     length_mm : float
         What `B` refers to.
     source : str
         Where the guess comes from, in words.
     doubts : tuple of Notice
         What the fit that it comes from says against using it.
+    control : {"displacement", "force"}
+        Decides the units of `sensor_sd` and `setting_sd`.
+    other_benches : dict of control to dict of name to (n,) array
+        Preload and errors in tests of another control, whose bench reads and sets other quantities.
     """
 
     draws: dict[str, Array]
     length_mm: float
     source: str
     doubts: tuple[Notice, ...] = ()
+    control: Control = "displacement"
+    other_benches: dict[Control, dict[str, Array]] = field(default_factory=dict)
 
-    def at(self, length_mm: float) -> dict[str, Array]:
-        """The draws for a sample of another length: creep is a strain of the whole wire."""
-        longer = length_mm / self.length_mm
-        return self.draws | {"B": self.draws["B"] * longer}
+    def at(self, test: Experiment) -> dict[str, Array]:
+        """The draws for the sample and the bench of a test: creep is a strain of the whole wire."""
+        longer = test.length_mm / self.length_mm
+        bench = {} if test.control == self.control else self.other_benches[test.control]
+        return self.draws | {"B": self.draws["B"] * longer} | bench
+
+    def on_benches_of(self, tests: Sequence[Experiment], rng: Generator) -> "GuessedWire":
+        """The same wire where tests of both controls are planned: what is not known of a bench is as wide as its prior.
+
+        Parameters
+        ----------
+        tests : sequence of Experiment
+            All that is planned.
+        """
+        k1 = self.draws["k1"]
+        scales = planned_scales(tests, float(np.median(k1)))
+        benches: dict[Control, dict[str, Array]] = {}
+        for control in {test.control for test in tests} - {self.control}:
+            drawn = default_prior(self.length_mm, scales, {}, control).named_draws(len(k1), rng)
+            benches[control] = {name: drawn[name] for name in SAMPLE}
+        return replace(self, other_benches=benches)
 
 
 def from_tables(
@@ -82,7 +107,12 @@ def from_tables(
     values = prior.named_draws(n, rng)
     draws = {name: values[name] for name in (*MATERIAL, *SAMPLE)}
     given = ", ".join(tables) if tables else "nothing"
-    return GuessedWire(draws, length_mm, f"the plan's guess ({given} given, the rest as wide as the model's prior)")
+    words = f"the plan's guess ({given} given, the rest as wide as the model's prior)"
+    guess = GuessedWire(draws, length_mm, words, control=tests[0].control).on_benches_of(tests, rng)
+    if "preload" in stated:  # a stretch on either bench
+        for bench in guess.other_benches.values():
+            bench["preload"] = draws["preload"]
+    return guess
 
 
 def _stated(tables: Mapping[str, Any], lines: Mapping[str, int], source: Path) -> dict[str, Any]:
@@ -132,4 +162,5 @@ def from_readings(experiment: Experiment, n: int, rng: Generator, spec: ModelSpe
     theta = rough_draws(block.target, block.modes, rng, n)
     natural = fitted_problem.in_units(NATURAL)
     parameters = natural.parameters(fitted_problem.theta_in(NATURAL, theta), natural.samples[0])
-    return GuessedWire(dict(parameters), experiment.length_mm, f"a quick fit of {experiment.name}")
+    words = f"a quick fit of {experiment.name}"
+    return GuessedWire(dict(parameters), experiment.length_mm, words, control=experiment.control)
