@@ -32,3 +32,20 @@ def test_differences_across_a_jump_do_not_count_as_curvature(jump: float, is_kep
     assert np.array_equal(at_jump.curvature, expected.curvature) == is_kept
     log_volume = -0.5 * np.linalg.slogdet(at_jump.curvature)[1]
     assert log_volume == pytest.approx(np.log(SD).sum(), abs=4.0)
+
+
+@pytest.mark.parametrize(("rows", "ends"), [(1000, True), (1001, False)])
+def test_few_rows_that_creep_are_ended_by_the_density_s_own_curvature(rows: int, ends: bool):
+    """Where the expected information is fifty times the curvature, each of its steps goes a fiftieth of the way."""
+
+    def density(z: Array, rows: Ints) -> Array:
+        return 0.02 * normal(z, rows)
+
+    def residuals(z: Array, rows: Ints) -> tuple[Array, Array]:
+        return density(z, rows), (z / SD).T
+
+    start = np.tile([-0.5, 8.0], (rows, 1))
+    found = climb(density, start, residuals, iterations=30, curvature_at_end=False)
+    assert (found.converged == ends).all()
+    assert (np.abs(found.z / SD).max() < 0.05) == ends
+    np.testing.assert_allclose(found.curvature, np.tile(np.diag(SD**-2.0), (rows, 1, 1)), rtol=1e-4, atol=1e-4)

@@ -25,6 +25,9 @@ _MOST_CURVED = 3.5
 # added to the curvature (of order one under the prior alone), tried in one batch where a step gains too little
 _DAMPINGS = np.array([1.0, 10.0, 100.0, 1e3, 1e4, 1e6])
 _PATIENCE = 10.0  # times the promised gain of a step: along a bent ridge there are many such steps
+_SLOW = 15  # steps, after which what is left seldom ends by the expected information: that bends more than the density
+# points of one Newton step by differences: so many cost hardly more than their fewest, which other steps take
+_MOST_POINTS = 2000
 _RELAX, _LEAST_DAMPING = 0.2, 0.3  # share of the damping kept after a step that was good; less than the latter is none
 
 
@@ -95,6 +98,17 @@ class _Climbs:
         least = np.where(self.arrived[rows], -np.inf, self.value[rows] + _ENOUGH * self.promised[rows])
         return np.isfinite(ahead) & (ahead > least)
 
+    def go_on(self, density: Density, rows: Ints, local: _Local, tolerance: float) -> Ints:
+        """Rows take the steps to where they looked, where these are good; the numbers of those that took them."""
+        good = self.gain_enough(rows, local.value)
+        if good.all():
+            self.take_step(rows, local, tolerance)
+            return rows
+        self.lead_back(density, rows[~good])
+        here = rows[good]
+        self.take_step(here, local.rows(good), tolerance)
+        return here
+
     def lead_back(self, density: Density, rows: Ints) -> None:
         """Rows that do not gain enough: done if they have just begun, else led to where a damped step leads."""
         at_start = self.arrived[rows]
@@ -144,6 +158,11 @@ class _Climbs:
         """(n,) densities that rows hardly rise beyond."""
         return self.value[rows] + _PATIENCE * self.promised[rows]
 
+    def give_up_below(self, rows: Ints, least: Array) -> None:
+        """Give up rows that hardly rise to the least densities (m,) that count."""
+        hopeless = self.most_promised(rows) < least
+        self.give_up(rows[hopeless])
+
     def give_up(self, rows: Ints) -> None:
         self.done[rows], self.value[rows] = True, -np.inf
 
@@ -168,8 +187,8 @@ def climb(
 
     The steps are Newton's, damped where they gain too little (Levenberg and Marquardt): on a bent ridge a damped step
     stays near the ridge, a shortened one does not. With `residuals` the curvature is the expected information (Fisher
-    scoring), which d + 1 evaluations give and which also points uphill where the density is not concave; without,
-    differences give the Hessian, which takes d² / 2.
+    scoring), which d + 1 evaluations give and which also points uphill where the density is not concave. Without, and
+    for the last rows, which creep along a ridge by the former, differences give the Hessian, which takes d² / 2.
 
     Parameters
     ----------
@@ -191,37 +210,41 @@ def climb(
     curvature_at_end : bool
         Where only the places matter, the curvature may stay that of the last step: the Hessian takes d² evaluations.
     """
-    look = partial(_by_differences, density)
-    if residuals is not None:
-        look = partial(_by_residuals, residuals)
+    usual = partial(_by_differences, density) if residuals is None else partial(_by_residuals, residuals)
     group = np.zeros(len(start), np.int64) if of is None else of
     ends = Ends.of(known or [nowhere(start.shape[1])])
     climbs = _Climbs.beginning(start)
-    for _ in range(iterations):
+    last = np.empty(0, np.intp)
+    look = usual
+    for step in range(iterations):
         rows = np.flatnonzero(~climbs.done)
         if not len(rows):
             break
+        if not len(last) and _are_the_last(step, *climbs.z[rows].shape):
+            last = rows
+            look = partial(_by_differences, density)
         local = look(climbs.ahead[rows], rows, climbs.curvature[rows])
-        kept = climbs.gain_enough(rows, local.value)
-        here = rows
-        if not kept.all():
-            climbs.lead_back(density, rows[~kept])
-            here = rows[kept]
-            local = local.rows(kept)
-        climbs.take_step(here, local, tolerance)
+        here = climbs.go_on(density, rows, local, tolerance)
         left = rows[~climbs.done[rows]]
         if reach < np.inf:
             least = _best(climbs.value, group) - reach
-            hopeless = climbs.most_promised(left) < least[left]
-            climbs.give_up(left[hopeless])
+            climbs.give_up_below(left, least[left])
         if of is not None:
             ended = here[climbs.converged[here]]
             if len(ended):
                 ends = ends.joined(of[ended], climbs.optimum(ended))
             same = ends.near(of[left], climbs.z[left], climbs.value[left])
             climbs.give_up(left[same])
+    if residuals is not None and len(last):
+        climbs.curvature[last] = usual(climbs.z[last], last, climbs.curvature[last]).curvature
     found = climbs.optimum(np.arange(len(start)))
     return curved(density, found) if curvature_at_end else found
+
+
+def _are_the_last(step: int, n: int, d: int) -> bool:
+    """Whether n rows of d coordinates have climbed so long, and are so few, that differences are to end them."""
+    points = n * d * d // 2
+    return step >= _SLOW and points <= _MOST_POINTS
 
 
 def _best(value: Array, group: Ints) -> Array:
