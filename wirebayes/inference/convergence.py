@@ -48,11 +48,19 @@ def farthest_apart(first: Array, second: Array) -> float:
     steps = first.shape[1]
     worst = 0.0
     for each in _with_tails(np.concatenate([first, second], axis=1)):
-        means = [part.mean(axis=1).reshape(-1, part.shape[-1]) for part in (each[:, :steps], each[:, steps:])]
-        error = np.sqrt(sum(m.var(axis=0, ddof=1) / len(m) for m in means))
-        apart = np.abs(means[1].mean(axis=0) - means[0].mean(axis=0))
-        worst = max(worst, float(np.max(apart / np.where(error > 0, error, 1.0))))
+        of_first = _walker_means(each[:, :steps])
+        of_second = _walker_means(each[:, steps:])
+        variance = sum(means.var(axis=0, ddof=1) / len(means) for means in (of_first, of_second))
+        error = np.sqrt(variance)
+        apart = np.abs(of_second.mean(axis=0) - of_first.mean(axis=0))
+        in_errors = apart / np.where(error > 0, error, 1.0)
+        worst = max(worst, float(in_errors.max()))
     return worst
+
+
+def _walker_means(draws: Array) -> Array:
+    """(ensembles walkers, d) means over the steps of draws (ensembles, steps, walkers, d)."""
+    return draws.mean(axis=1).reshape(-1, draws.shape[-1])
 
 
 def _with_tails(values: Array) -> tuple[Array, Array, Array]:

@@ -105,14 +105,14 @@ class _Past:
     def joined(self, new: Weighted) -> "_Past":
         """With the draws of one more proposal."""
         of_old = np.vstack([self.log_proposals, new.proposal.log_density(self.z)])
-        of_new = np.vstack([*(q.log_density(new.z) for q in self.proposals), new.log_proposal])
-        return _Past(
-            np.vstack([self.z, new.z]),
-            np.vstack([self.log_density, new.log_density]),
-            np.hstack([of_old, of_new]),
-            (*self.proposals, new.proposal),
-            (*self.counts, len(new.z)),
-        )
+        by_earlier = [proposal.log_density(new.z) for proposal in self.proposals]
+        of_new = np.vstack([*by_earlier, new.log_proposal])
+        z = np.vstack([self.z, new.z])
+        log_density = np.vstack([self.log_density, new.log_density])
+        log_proposals = np.hstack([of_old, of_new])
+        proposals = (*self.proposals, new.proposal)
+        counts = (*self.counts, len(new.z))
+        return _Past(z, log_density, log_proposals, proposals, counts)
 
     def points(self, wanted: Bools, ess: float) -> tuple[WeightedPoints, WeightedPoints]:
         """Points of the sum of the wanted densities to a power, and of the sum itself.

@@ -117,11 +117,12 @@ def _at_one_scale(exponent: str, specimens: list[Row], known: Sequence[tuple[Qua
     away = middle - own
     low, power, high = _quantiles([row["parameters"][exponent] for row in specimens])
     below, value, above = np.log(_quantiles([of for of, _ in known]))
-    # the power is hardly correlated with what is known at the own scale
     moved = value + power * away
-    to_low = np.hypot(value - below, (high - low) / 2.0 * away)
-    to_high = np.hypot(above - value, (high - low) / 2.0 * away)
-    return np.exp(np.array([moved - to_low, moved, moved + to_high])), float(np.exp(middle))
+    by_power = (high - low) / 2.0 * away  # hardly correlated with what is known at the own scale
+    to_low = np.hypot(value - below, by_power)
+    to_high = np.hypot(above - value, by_power)
+    log_known = np.array([moved - to_low, moved, moved + to_high])
+    return np.exp(log_known), float(np.exp(middle))
 
 
 def _row(

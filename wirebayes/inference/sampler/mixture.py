@@ -85,11 +85,13 @@ class Mixture:
         d = self.centres.shape[1]
         nu = np.reshape(self.degrees, (-1, 1))
         constant = gammaln(0.5 * (nu + d)) - gammaln(0.5 * nu) - 0.5 * d * np.log(nu * np.pi)
-        own = np.log(self.weights) - np.log(np.einsum("kii->ki", self.factors)).sum(axis=1)
+        log_volume = np.log(np.einsum("kii->ki", self.factors)).sum(axis=1)
+        own = np.log(self.weights) - log_volume
         kind = distances.dtype
+        height = (constant + own[:, None]).astype(kind)
         heavy = (-0.5 * (nu + d)).astype(kind)
         nu = nu.astype(kind)
-        return (constant + own[:, None]).astype(kind) + heavy * np.log1p(distances / nu)
+        return height + heavy * np.log1p(distances / nu)
 
 
 def from_modes(centres: Array, covariances: Array, log_weights: Array) -> Mixture:

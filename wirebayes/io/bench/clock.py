@@ -192,11 +192,14 @@ def _check_hours_go_beyond_twelve(table: RawTable, column: int, values: Floats) 
     steps = np.diff(values, prepend=values[0])
     closest = steps[steps > 0.0].min(initial=np.inf)
     goes_round = (steps > -_ROUND) & (steps <= -0.5 * _ROUND) & (values > _LATE * closest)
-    if goes_round.any() and values.min() >= _HOUR and values.max() < _ROUND + _HOUR:
-        row = int(np.flatnonzero(goes_round)[0])
-        before, after = (table.rows[i].cell(column) for i in (row - 1, row))
-        found = f"{shown(after)} after {shown(before)}, and no hour above 12"
-        raise table.complain(table.rows[row].line, column, found, _WITHOUT_DOUBT)
+    within_twelve = values.min() >= _HOUR and values.max() < _ROUND + _HOUR
+    if not goes_round.any() or not within_twelve:
+        return
+    number = int(np.flatnonzero(goes_round)[0])
+    row = table.rows[number]
+    before = table.rows[number - 1].cell(column)
+    found = f"{shown(row.cell(column))} after {shown(before)}, and no hour above 12"
+    raise table.complain(row.line, column, found, _WITHOUT_DOUBT)
 
 
 def _days_begin(values: Floats, of_day: bool) -> Bools:
@@ -270,16 +273,16 @@ def _with_colons(cell: str, joint: str) -> str:
 
 def _no_clock(table: RawTable, column: int, unit: Unit) -> Undecided:
     """The question what plain numbers mean under a header that speaks of clocks."""
-    name, first = table.header[column], table.rows[0]
     units = {"s": "seconds", "min": "minutes", "h": "hours", "d": "days, as spreadsheets count"}
     leading = None if unit.clock is None else unit.clock.leading_s
     if leading and all(_with_colons(cell, ".") != cell for cell in table.column(column)):
-        units = {_WRITTEN[leading].replace(":", "."): CALLED[leading], **units}
-    return Undecided(
-        f"{table.where(first.line, column)}: found {first.cell(column)!r} under {unit.text!r}",
-        "the unit of time",
-        {f"--map {name}=time [{text}]": called for text, called in units.items()},
-    )
+        with_points = _WRITTEN[leading].replace(":", ".")
+        units = {with_points: CALLED[leading], **units}
+    name = table.header[column]
+    answers = {f"--map {name}=time [{text}]": called for text, called in units.items()}
+    first = table.rows[0]
+    where = table.where(first.line, column)
+    return Undecided(f"{where}: found {first.cell(column)!r} under {unit.text!r}", "the unit of time", answers)
 
 
 def _value(found: re.Match[str], leading: float) -> float:

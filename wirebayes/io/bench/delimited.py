@@ -134,15 +134,17 @@ def _wanted(lines: list[str]) -> str:
 def _score(lines: list[str], sign: str) -> tuple[float, int, int]:
     """How well a sign splits lines: share of the cells that are values, headers of as many cells, cells."""
     split = [_cells(line, sign) for line in lines]
-    measured = [numbers for cells in split if is_measured(numbers := [*map(bare, cells)])]
+    bare_cells = [[bare(cell) for cell in cells] for cells in split]
+    measured = [cells for cells in bare_cells if is_measured(cells)]
     if not measured:
         return 0.0, 0, 0
-    values = sum(is_value(cell) for cells in measured for cell in cells)
-    filled = sum(bool(cell) for cells in measured for cell in cells)
-    width = sorted(map(len, measured))[len(measured) // 2]
-    headed = any(len(cells) == width and not any(map(is_value, cells)) for cells in split)
-    every = len(measured) / len(lines)
-    return round(every * values / max(filled, 1), 3), int(headed), width
+    filled = [cell for cells in measured for cell in cells if cell]
+    share = sum(map(is_value, filled)) / max(len(filled), 1)
+    widths = sorted(map(len, measured))
+    width = widths[len(widths) // 2]
+    is_headed = any(len(cells) == width and not any(map(is_value, cells)) for cells in split)
+    of_lines = len(measured) / len(lines)
+    return round(of_lines * share, 3), int(is_headed), width
 
 
 def _cells(line: str, sign: str) -> list[str]:

@@ -32,18 +32,33 @@ def sheet_of_records(path: Path, text: str, encoding: str) -> Sheet:
         In which it was written.
     """
     found = [(line, _flat(record)) for line, record in _objects(text)]
-    if len(found) == 1 and all(isinstance(value, list) for value in found[0][1].values()):
-        line, lists = found[0]
-        longest = max((len(values) for values in lists.values()), default=0)
-        found = [(line, {k: v[i] for k, v in lists.items() if i < len(v)}) for i in range(longest)]
-    names = tuple(dict.fromkeys(name for _, record in found for name in record))
-    rows = [SheetRow(line, tuple(_text(record.get(name)) for name in names)) for line, record in found]
-    return Sheet(path, (SheetRow(1, names), *rows), described="records in JSON", encoding=encoding)
+    if len(found) == 1:
+        line, record = found[0]
+        if all(isinstance(value, list) for value in record.values()):
+            found = [(line, row) for row in _rows_of(record)]
+    every_name = [name for _, record in found for name in record]
+    names = tuple(dict.fromkeys(every_name))
+    rows = [SheetRow(1, names)]
+    for line, record in found:
+        cells = tuple(_text(record.get(name)) for name in names)
+        rows.append(SheetRow(line, cells))
+    return Sheet(path, tuple(rows), described="records in JSON", encoding=encoding)
+
+
+def _rows_of(lists: dict[str, list[Any]]) -> list[dict[str, Any]]:
+    """The rows of a table that is written as a list a column; a list that ends early has no cells in the last rows."""
+    longest = max(map(len, lists.values()), default=0)
+    rows = []
+    for i in range(longest):
+        rows.append({name: values[i] for name, values in lists.items() if i < len(values)})
+    return rows
 
 
 def _objects(text: str) -> Iterator[tuple[int, dict[str, Any]]]:
     """Each object, and the line that it begins on."""
-    decoder, at, line = json.JSONDecoder(), 0, 1
+    decoder = json.JSONDecoder()
+    at = 0
+    line = 1
     while at < len(text):
         if text[at] in _BETWEEN:
             line += text[at] == "\n"

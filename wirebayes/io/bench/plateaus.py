@@ -162,14 +162,16 @@ def _joined(bounds: list[int], x: Floats, noise: float) -> list[tuple[int, int]]
 def _trimmed(x: Floats, begin: int, end: int, scatter: float) -> tuple[int, int]:
     """A piece without the ends of the moves beside it: from the first few readings at its level to the last few."""
     edge = min(EDGE, end - begin)
-    off = x[begin:end] - np.median(x[begin:end])
-    level = np.abs(np.convolve(off, np.full(edge, 1.0 / edge), "valid")) <= _away(x, scatter / np.sqrt(edge))
+    piece = x[begin:end]
+    off = piece - np.median(piece)
+    means = np.convolve(off, np.full(edge, 1.0 / edge), "valid")
+    level = np.abs(means) <= _away(x, scatter / np.sqrt(edge))
     alone = np.abs(off) <= _away(x, scatter)  # where there is little noise, the mean is not as sharp
-    first, last = np.flatnonzero(level & alone[: len(level)]), np.flatnonzero(level & alone[edge - 1 :])
+    first = np.flatnonzero(level & alone[: len(level)])
+    last = np.flatnonzero(level & alone[edge - 1 :])
     if not len(first) or not len(last):
         return begin, begin
-    begin, end = begin + int(first[0]), begin + int(last[-1]) + edge
-    return begin, end
+    return begin + int(first[0]), begin + int(last[-1]) + edge
 
 
 def _away(x: Floats, error: float) -> float:

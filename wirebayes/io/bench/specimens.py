@@ -7,6 +7,7 @@ those of two sensors as often as of two specimens, and so are two of one quantit
 """
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -153,16 +154,23 @@ def _by_row_above(table: RawTable) -> _Marked | None:
 
 def _by_repetition(table: RawTable) -> _Marked | None:
     """Names that all come as often: the first of each is the first specimen's, and so on; ``Load.1`` repeats Load."""
-    header = tuple(
-        again[1] if (again := _AGAIN.fullmatch(name)) and again[1] in table.header else name for name in table.header
-    )
-    count = {name: header.count(name) for name in header if name}
+    header = tuple(_without_count(name, table.header) for name in table.header)
+    count = Counter(name for name in header if name)
     repeated = {name for name, times in count.items() if times > 1}
     if len({count[name] for name in repeated}) != 1:
         return None
-    mark = tuple(str(header[: i + 1].count(name)) if name in repeated else "" for i, name in enumerate(header))
-    full = tuple(f"{name} {m}".strip() for m, name in zip(mark, header, strict=True))
-    return _Marked(mark, header, full, certain=False)
+    marks = []
+    for i, name in enumerate(header):
+        number = header[: i + 1].count(name)
+        marks.append(str(number) if name in repeated else "")
+    full = tuple(f"{name} {mark}".strip() for mark, name in zip(marks, header, strict=True))
+    return _Marked(tuple(marks), header, full, certain=False)
+
+
+def _without_count(name: str, names: Sequence[str]) -> str:
+    """``Load`` of ``Load.1``, where both are among the names."""
+    again = _AGAIN.fullmatch(name)
+    return again[1] if again and again[1] in names else name
 
 
 def _by_numbers(table: RawTable) -> _Marked:
@@ -263,14 +271,16 @@ def _plain_numbers(table: RawTable, column: int) -> Floats:
 def _table_of(table: RawTable, marked: _Marked, mark: str, marks: Sequence[str]) -> tuple[str, RawTable]:
     """The table of one specimen: its columns, and those that belong to none."""
     own = set(marked.own(mark))
-    names = {marked.name[i] for i in own}
-    common = {i for i, m in enumerate(marked.mark) if m not in marks and table.header[i] not in names}
-    header = tuple(
-        marked.name[i] if i in own else (name if i in common and marked.name[i] else "")
-        for i, name in enumerate(table.header)
-    )
+    own_names = {marked.name[i] for i in own}
+    header = []
+    for i, name in enumerate(table.header):
+        is_common = marked.mark[i] not in marks and name not in own_names and marked.name[i]
+        if i in own:
+            header.append(marked.name[i])
+        else:
+            header.append(name if is_common else "")
     rows = tuple(row for row in table.rows if any(row.cell(i) for i in own))
-    return mark, replace(table, header=header, rows=rows, specimen=mark or "1")
+    return mark, replace(table, header=tuple(header), rows=rows, specimen=mark or "1")
 
 
 def _mapping_of(

@@ -93,15 +93,15 @@ class Recorded:
 
     def of_rows(self, kept: Ints) -> "Recorded":
         """The same of some rows."""
+        rows = tuple(self.table.rows[i] for i in kept)
+        texts = {role: [cells[i] for i in kept] for role, cells in self.texts.items()}
+        values = {role: numbers[kept] for role, numbers in self.values.items()}
+        hold = None if self.hold is None else self.hold[kept]
         clock = self.hold_clock
-        return replace(
-            self,
-            table=replace(self.table, rows=tuple(self.table.rows[i] for i in kept)),
-            texts={role: [texts[i] for i in kept] for role, texts in self.texts.items()},
-            values={role: values[kept] for role, values in self.values.items()},
-            hold=None if self.hold is None else self.hold[kept],
-            hold_clock=None if clock is None else replace(clock, time_s=clock.time_s[kept]),
-        )
+        if clock is not None:
+            clock = replace(clock, time_s=clock.time_s[kept])
+        table = replace(self.table, rows=rows)
+        return replace(self, table=table, texts=texts, values=values, hold=hold, hold_clock=clock)
 
     def check_zero(self, length_mm: float) -> None:
         """Refuse steps of a machine's position: how far they stretch the wire is not known. Weights pull from any zero.

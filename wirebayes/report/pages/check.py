@@ -88,8 +88,14 @@ def _imported(experiment: ImportedExperiment, picture: list[Block]) -> list[Bloc
         f"Length {number(experiment['length_mm'])} mm.",
     ]
     done = [f"{note[:1].upper()}{note[1:]}." for note in experiment["notes"]]
-    columns = [Points("What it is", about), Points("What was done", done or ["Nothing had to be decided."])]
-    return [*before_the_answer(experiment), *picture, *beside_the_answer(experiment), Columns(columns)]
+    what_it_is = Points("What it is", about)
+    what_was_done = Points("What was done", done or ["Nothing had to be decided."])
+    return [
+        *before_the_answer(experiment),
+        *picture,
+        *beside_the_answer(experiment),
+        Columns([what_it_is, what_was_done]),
+    ]
 
 
 def _checked(experiment: CheckedExperiment, picture: list[Block]) -> list[Block]:

@@ -96,13 +96,16 @@ def error_left(robot: Robot, history: History, found: Estimate, to: Target, join
     (n, len(rows)) array
         m; NaN where the platform is not held.
     """
-    n, legs = len(found.track.position_m), robot.legs
+    n = len(found.track.position_m)
     out = np.full((n, len(rows)), np.nan)
     for i, k in enumerate(rows):
-        bare, offset = inverse.lengths(robot, np.broadcast_to(joint_m[..., k, :], (n, legs)))
+        position = to.position_m[k]
+        joints = np.broadcast_to(joint_m[..., k, :], (n, robot.legs))
+        bare, offset = inverse.lengths(robot, joints)
         zero = (bare + found.error_m) * (1.0 + found.track.strain[:, k])
         loaded = history.robot_at(robot, int(k))
-        there = forward.solve_equilibrium(loaded, found.wires, zero, offset, to.position_m[k], to.rotation[k])
-        distance = np.linalg.norm(there.position_m - to.position_m[k], axis=1)
-        out[:, i] = np.where(there.found & found.track.held[:, k], distance, np.nan)
+        there = forward.solve_equilibrium(loaded, found.wires, zero, offset, position, to.rotation[k])
+        distance = np.linalg.norm(there.position_m - position, axis=1)
+        is_held = there.found & found.track.held[:, k]
+        out[:, i] = np.where(is_held, distance, np.nan)
     return out

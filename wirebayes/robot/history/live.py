@@ -333,10 +333,13 @@ class LiveEstimator:
 
     def _read(self, time_s: float, y: Floats) -> None:
         """What the sensors say, added to what they said before."""
-        n, of = self._n, self._of
+        n = self._n
+        of = self._of
         predicted = np.concatenate([self._tension, roll_and_pitch(self._R)], 1)[:-1]
-        counts = reading_weight(None if self._last == -np.inf else time_s - self._last)
-        noise = of.noise * self._rng.standard_normal((n, len(y))) / np.sqrt(counts)
+        since = None if self._last == -np.inf else time_s - self._last
+        counts = reading_weight(since)
+        normal = self._rng.standard_normal((n, len(y)))
+        noise = of.noise * normal / np.sqrt(counts)
         left = y - predicted[:n] - of.offset * self._offset + noise
         left = chosen_rows(self._live[:n], left, np.nan)
         self._information.add(of, slopes(predicted[n:]), left, counts)

@@ -96,11 +96,13 @@ def _tangent(h: Floats, along: Floats, rho: Floats, tiny: Floats) -> _Tangent:
     square = h * h + along * along - rho * rho
     least = _LEAST * rho
     straight = np.sqrt(np.maximum(square, least**2 + tiny * tiny))
-    size = np.maximum(np.sqrt(h * h + along * along), tiny) * np.sqrt(straight * straight + rho * rho)
+    to_point = np.maximum(np.sqrt(h * h + along * along), tiny)
+    size = to_point * np.sqrt(straight * straight + rho * rho)
     cosine = (along * straight - h * rho) / size
     sine = (along * rho + h * straight) / size
-    wrap = np.arctan2(sine, cosine)
-    return _Tangent(straight, sine, cosine, np.where(wrap < -1e-9, wrap + 2 * np.pi, wrap), square > least**2)
+    angle = np.arctan2(sine, cosine)
+    wrap = np.where(angle < -1e-9, angle + 2 * np.pi, angle)
+    return _Tangent(straight, sine, cosine, wrap, square > least**2)
 
 
 def traced(pulleys: Pulleys | None, leg: int, line_m: Floats, points: int = 12) -> Floats:

@@ -74,13 +74,18 @@ def hang(robot: Robot, position_m: Floats, reference: Floats, asked_rad: Floats 
     near = np.broadcast_to(reference, (len(position_m), 3, 3))
     asked = np.full(3, np.nan) if asked_rad is None else asked_rad
     found, good = _balances(robot, position_m, near, asked)
-    nearest = [_nearest_first(found, np.flatnonzero(fine) + k * len(fine)) for k, fine in enumerate(good)]
-    out, tension = np.full(near.shape, np.nan), np.full((len(near), robot.legs), np.nan)
-    for k, rows in enumerate(nearest):
+    out = np.full(near.shape, np.nan)
+    tension = np.full((len(near), robot.legs), np.nan)
+    others = []
+    for k, fine in enumerate(good):
+        rows = np.flatnonzero(fine) + k * len(fine)
+        rows = _nearest_first(found, rows)
         if rows.size:
-            out[k], tension[k] = found.rotation[rows[0]], found.tension_N[rows[0]]
-    others = tuple(turning.vector(found.rotation[rows[1:]]).reshape(-1, 3) for rows in nearest)
-    return Hanging(out, tension, others, _choices(robot, position_m, out, tension))
+            out[k] = found.rotation[rows[0]]
+            tension[k] = found.tension_N[rows[0]]
+        other = turning.vector(found.rotation[rows[1:]])
+        others.append(other.reshape(-1, 3))
+    return Hanging(out, tension, tuple(others), _choices(robot, position_m, out, tension))
 
 
 def _choices(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> Ints:

@@ -88,10 +88,13 @@ def _refuse_lengths(robot: Robot, session: Session, rows: Bools, table: CsvTable
     for i, j in combinations(range(robot.legs), 2):
         swapped = _apart(robot, session, rows, _swapped(robot.legs, i, j))
         there = swapped[[i, j]].max()
-        if as_read[[i, j]].min() > max(_APART * robot.span_m, _BETTER * there):
-            found = f"{joints[i]} as far as {number(as_read[i])} m from the lengths to the stated poses"
-            expected = _in_place(f"{number(there)} m")
-            raise InputError(f"{table.path}, columns {joints[i]} and {joints[j]}: found {found}, expected {expected}")
+        nearest = as_read[[i, j]].min()
+        if nearest <= max(_APART * robot.span_m, _BETTER * there):
+            continue
+        columns = f"columns {joints[i]} and {joints[j]}"
+        found = f"{joints[i]} as far as {number(as_read[i])} m from the lengths to the stated poses"
+        expected = _in_place(f"{number(there)} m")
+        raise InputError(f"{table.path}, {columns}: found {found}, expected {expected}")
 
 
 def _apart(robot: Robot, session: Session, rows: Bools, order: Sequence[int]) -> Floats:
