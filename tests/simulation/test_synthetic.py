@@ -112,6 +112,9 @@ def test_same_seed_same_bytes_and_another_seed_other_readings(tmp_path):
         (["--lengths", "1e-9"], "expected lengths from 1e-03 to 1e+08 mm"),
         (["--unrecorded", "12"], "expected a hold from 1 to 11"),
         (["--lengths", "1000,1000"], "expected different lengths"),
+        (["--effect", "thermal_expansion.alpha=1e-5"], "found tests that read the same without it"),
+        (["--effect", "lost_motion.w=0.1", "--weights", "2,4"], "found tests that read the same without it"),
+        (["--effect", "superposition.omega=1", "--history", "additive"], "found --history additive"),
     ],
 )
 def test_wrong_options_are_said_and_nothing_is_written(options, message, tmp_path, capsys):

@@ -10,6 +10,7 @@ from unicodedata import normalize
 from wirebayes._version import __version__
 from wirebayes.commands.options import (
     Source,
+    check_history,
     check_priors,
     check_seed,
     check_train_holds,
@@ -245,10 +246,8 @@ def _check_possible(
     effect: Effect, members: Sequence[Experiment], file: Path, known: Mapping[str, type[Effect]], history: History
 ) -> None:
     """An effect that these holds cannot show at all is an error of the user's, not a prior-shaped posterior."""
+    check_history(effect, history)
     option = f"--effect {effect.key}"
-    if effect.needs_saturation and history == "additive":
-        found = "creep that is added anew in every hold has no total"
-        raise InputError(f"{option}: found --history additive, expected saturating: {found}")
     if effect.control is not None:
         found = f"an effect of the tests under {effect.control} alone"
         raise InputError(f"{option}: found {found}, expected {effect.name}: a fit has one amplitude a kind")

@@ -202,6 +202,13 @@ def model_spec(elastic_law: ElasticLaw, history: History, likelihood: Likelihood
     return ModelSpec(elastic_law, history, likelihood)
 
 
+def check_history(effect: Effect, history: History) -> None:
+    """Refuse an effect that needs a total of the creep beside a history that has none."""
+    if effect.needs_saturation and history == "additive":
+        why = "creep that is added anew in every hold has no total"
+        raise InputError(f"--effect {effect.key}: found --history additive, expected saturating: {why}")
+
+
 def text_of(values: Numbers) -> str:
     """Numbers as the command line spells them."""
     if isinstance(values, str):

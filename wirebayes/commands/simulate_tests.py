@@ -7,12 +7,21 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes._version import __version__
-from wirebayes.commands.options import Numbers, check_seed, check_whole, model_spec, names_given, path_of, text_of
+from wirebayes.commands.options import (
+    Numbers,
+    check_history,
+    check_seed,
+    check_whole,
+    model_spec,
+    names_given,
+    path_of,
+    text_of,
+)
 from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
 from wirebayes.io.experiment_file import SHORTEST
 from wirebayes.io.run_folder import check_run, open_run
-from wirebayes.simulation.stated_truth import effect_option, finite_number
+from wirebayes.simulation.stated_truth import effect_option, finite_number, without_trace
 from wirebayes.simulation.synthetic import Bench, Truth, draw, write_tests
 from wirebayes.strict.files import PathLike
 from wirebayes.strict.table import LARGEST
@@ -113,7 +122,7 @@ def simulate_tests(
     control, path = _settings(displacements, weights, unload)
     gaps = frozenset(unrecorded)
     _check_protocol(control, path, sizes, moments, gaps)
-    _check_events(found, path, gaps)
+    _check_effects(found, history, path, gaps)
     warmth = _temperatures(temperature)
     alike = Bench(times_s=moments, unrecorded=gaps, temperatures_C=warmth).setting(control, path, float(resolution))
     benches = _benches(alike, tests, sizes)
@@ -145,12 +154,21 @@ def _write(folder: Path, configuration: Mapping[str, Any], benches: Sequence[Ben
     """Draw and write the tests, where that was not done before."""
     seed = configuration["seed"]
     if check_run(folder, configuration) == "new":
-        draw(benches, truth, seed)  # whatever is wrong with the truth is said before a folder is made
+        _check_truth(benches, truth, seed)  # before a folder is made
     with open_run(folder, configuration) as run:
         if run.state != "done":
             write_tests(folder, benches, truth, seed)
             run.finish()
         return run.state != "done"
+
+
+def _check_truth(benches: Sequence[Bench], truth: Truth, seed: int) -> None:
+    """Refuse a truth that is impossible, or that has effects of which the tests show nothing."""
+    made = draw(benches, truth, seed)
+    for effect in without_trace(made, truth.effects):
+        where = f" ({effect.shows})" if effect.shows else ""
+        found = "tests that read the same without it"
+        raise InputError(f"--effect {effect.key}: found {found}, expected some that can show it{where}")
 
 
 def _parameters(given: Mapping[str, float]) -> dict[str, float]:
@@ -199,11 +217,14 @@ def _settings(displacements: Numbers, weights: Numbers, unload: int) -> tuple[Co
     return control, path + path[-2 : -2 - unload : -1]
 
 
-def _check_events(effects: Mapping[str, Effect], path: Sequence[float], unrecorded: frozenset[int]) -> None:
-    """Refuse an event at a hold that no test has, or of which nothing is read."""
+def _check_effects(
+    effects: Mapping[str, Effect], history: History, path: Sequence[float], unrecorded: frozenset[int]
+) -> None:
+    """Refuse what the history has no meaning for, and an event at a hold that no test has, or that is not read."""
     last = len(path)
     recorded = set(range(1, last + 1)) - unrecorded
     for key, effect in effects.items():
+        check_history(effect, history)
         if isinstance(effect, EventEffect) and effect.hold not in recorded:
             raise InputError(f"--effect {key}: found hold {effect.hold}, expected a recorded one from 1 to {last}")
 
