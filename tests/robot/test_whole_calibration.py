@@ -71,6 +71,13 @@ def test_intervals_rest_on_as_many_degrees_of_freedom_as_follow_the_joint_error(
     np.testing.assert_allclose(half, [t.ppf(0.95, 3), t.ppf(0.95, 12), norm.ppf(0.95), norm.ppf(0.95)], rtol=1e-5)
 
 
+def test_no_quantity_follows_the_joint_error_more_than_in_proportion():
+    """Where equations are nearly singular, rounding may say so: an interval was then longer than the Earth."""
+    sd = np.ones(2)
+    wider = summary._FACTOR ** np.array([-4.0, 3.0])
+    np.testing.assert_allclose(summary._half(sd, wider, 1.0), [norm.ppf(0.95), t.ppf(0.95, 1)], rtol=1e-5)
+
+
 def test_equations_that_are_singular_without_damping_are_damped(fitted, session_csv, tmp_path, monkeypatch):  # noqa: F811
     """The first step comes out as no numbers: the estimate is found a step later."""
     file, truth = session_csv

@@ -92,7 +92,8 @@ def _means(found: RobotPosterior) -> dict[str, Floats]:
 def _half(sd: Floats, wider: Floats, degrees: float) -> Floats:
     """Quantiles of Student's t; `wider` are the standard deviations with an error of the joint values larger."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        follows = np.nan_to_num(np.log(wider / sd) / np.log(_FACTOR))  # what is exact follows nothing
+        slope = np.nan_to_num(np.log(wider / sd) / np.log(_FACTOR))  # what is exact follows nothing
+        follows = np.clip(slope, 0.0, 1.0)  # as it does of normal posteriors; beyond, equations are nearly singular
         own = np.minimum(degrees / follows**2, _MANY)
     return np.asarray(stdtrit(own, 0.95))
 
