@@ -154,7 +154,8 @@ def _began(history: HistoryOfRobot) -> str:
     return (
         f"The history goes on where a calibration of {counted(known['holds'], 'hold')} and "
         f"{lasting(known['duration_s'])} ended: its posterior gives the wires, their creep so far and their "
-        f"reference lengths, which it knows to {from_to(min(sd), max(sd))} mm (standard error)."
+        f"reference lengths, which it knows to {from_to(min(sd), max(sd))} mm (standard error, errors of points "
+        "included)."
     )
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from wirebayes.json_files.calibrate import CalibratedUnknowns
+from wirebayes.numeric.linear_algebra import solve
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
@@ -53,18 +54,41 @@ def calibrated(found: RobotPosterior, session: Session) -> Calibrated:
     Parameters
     ----------
     found : RobotPosterior
-        Biases of its sensors, and its geometry, are averaged over.
+        Biases of its sensors are averaged over. Errors of its geometry stand as those errors of the lengths that come
+        to the same, for a history is followed on one robot, the calibrated one.
     session : Session
     """
     unknowns = found.unknowns
     state = found.state
     _, root = unknowns.moments
-    at = unknowns.slices["wires"]
     own = replace(unknowns.prior, bias_sd_N=0.0)
     d = len(own.moments(unknowns.robot.legs)[0])
-    covariance = root @ found.covariance[at, at] @ root.T
+    covariance = root @ _with_geometry(found) @ root.T
     there = replace(session, position_m=state.position_m, rotation=state.rotation)
     return Calibrated(unknowns.robot, own, there, unknowns.parts(state.white).wires[:d], covariance[:d, :d])
+
+
+def _with_geometry(found: RobotPosterior) -> Floats:
+    """Covariance ``(d, d)`` of references and wires in units of their prior, errors of points and drums included.
+
+    A point that is off makes its wire's way longer or shorter, as an error of the reference does, but from pose to pose
+    by another amount. The readings often tell the sum of both well, and neither alone. So the sum counts, averaged over
+    the poses of the session.
+    """
+    unknowns = found.unknowns
+    wires = unknowns.slices["wires"]
+    if wires.start == 0:  # points and drums are exact
+        return found.covariance[wires, wires]
+    loop = found.equations.by_robot[:, found.equations.rows["loop"]]
+    first = unknowns.references.start - wires.start
+    references = slice(first, first + unknowns.robot.legs)
+    by_reference = loop[..., unknowns.references]
+    one = np.zeros((len(loop), unknowns.of_wires, unknowns.count))
+    one[:, :, wires] = np.eye(unknowns.of_wires)
+    for name in ("exit", "platform", "drum"):
+        part = unknowns.slices[name]
+        one[:, references, part] = solve(by_reference, loop[..., part])
+    return np.asarray((one @ found.covariance @ one.mT).mean(0))
 
 
 def to_dict(found: Calibrated) -> CalibratedUnknowns:
