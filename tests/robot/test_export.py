@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.robot import cases
 from tests.robot.lines import CORE
+from wirebayes.commands import export
 from wirebayes.effects import effect_named
 from wirebayes.errors import InputError
 from wirebayes.robot.export import files
@@ -225,6 +226,22 @@ def test_each_line_has_its_own_rows_of_creep():
     header, rows = files.creep_tables(alone, _line("hooke", None, {}), [2.0], [60.0])
     assert header == files.TABLE
     assert len(rows) == 1 and len(rows[0]) == len(files.TABLE)
+
+
+@pytest.mark.parametrize(
+    ("loads_N", "longest_s", "said"),
+    [
+        ([1.0, 4.0], 120.0, []),
+        ([0.99, 4.0], 120.0, ["tensions 0.99 to 4 N leave the tested range 1 to 4 N"]),
+        ([1.0, 4.01], 120.0, ["tensions 1 to 4.01 N leave the tested range 1 to 4 N"]),
+        ([1.0, 4.0], 121.0, ["2.02 min is longer than the longest tested hold, 2 min"]),
+    ],
+)
+def test_a_creep_table_beyond_what_was_tested_is_said(loads_N, longest_s, said):
+    robot = schema.read_robot_file("hangprinter-4")
+    tested = replace(_line("hooke", None, {}), tension_range_N=(1.0, 4.0), time_range_s=(0.0, 120.0))
+    notices = export._of_table(robot, tested, np.array(loads_N), np.array([60.0, longest_s]))
+    assert [(notice.kind, notice.text) for notice in notices] == [("extrapolation", text) for text in said]
 
 
 def test_what_is_known_of_a_fit_is_not_said_of_a_given_wire():

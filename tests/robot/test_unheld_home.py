@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.robot.test_export import _line
 from wirebayes.answers.robot import of_pose
 from wirebayes.commands import export
 from wirebayes.commands.asked_pose import asked_place
@@ -139,13 +138,13 @@ def test_a_home_position_without_balance_is_said_with_its_metres():
 @pytest.mark.parametrize("files", [{}, {"klipper.cfg": "", "robot.xml": ""}])
 def test_an_export_gives_the_metres_to_the_nearest_balance_with_and_without_simulators(files):
     robot = replace(two_wires(), home_m=np.array([0.2, 0.05, -0.6]))
-    said = export._warnings(robot, _line("hooke", None, {}), files)
+    said = export._warnings(robot, files)
     assert [notice for notice in said if "is 0.05 m away" in notice.text] == home.home_notices(robot)
 
 
 def test_an_export_says_once_that_nothing_holds_the_home_pose():
     robot = replace(two_wires(), home_m=np.array([0.2, 0.05, -0.6]))
-    said = export._warnings(robot, _line("hooke", None, {}), {"klipper.cfg": ""})
+    said = export._warnings(robot, {"klipper.cfg": ""})
     assert [notice.kind for notice in said if "home pose" in notice.text] == ["unheld", "left-out"]
     assert sum("no tensions" in notice.text for notice in said) == 1
 

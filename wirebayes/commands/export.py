@@ -2,16 +2,19 @@
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from wirebayes.commands.options import Numbers, check_seed, numbers, path_of, rising_times, text_of
 from wirebayes.commands.wires import RobotLike, Wires, configuration, draws_for, posterior_of, robot_of
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
 from wirebayes.json_files.export import ExportSummary
+from wirebayes.numeric.typing import Floats
 from wirebayes.result_warnings import Notice, to_json
 from wirebayes.robot.export import files
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
-from wirebayes.robot.mechanics.wire_doubts import doubts
+from wirebayes.robot.mechanics.wire_doubts import wire_warnings
 from wirebayes.robot.motion.home import home_notices
 from wirebayes.robot.motion.plausible import robot_notices
 from wirebayes.strict.files import PathLike
@@ -83,7 +86,7 @@ def export(
     line = draws_for(machine, wires, draws, experiment, own)
     contents = _contents(machine, line)
     header, table = files.creep_tables(machine, line, loads, moments)
-    warnings = _warnings(machine, line, contents)
+    warnings = [*_of_table(machine, line, loads, moments), *_warnings(machine, contents)]
     summary: ExportSummary = {
         "files": sorted([*contents, TABLE]),
         "creep_table": [dict(zip(header, row, strict=True)) for row in table],
@@ -113,9 +116,16 @@ def _contents(robot: Robot, line: WireDraws) -> dict[str, str]:
     return contents | files.simulators(robot, line)
 
 
-def _warnings(robot: Robot, line: WireDraws, contents: Mapping[str, str]) -> list[Notice]:
-    """What speaks against the fits, and what could not be exported."""
-    out = [*doubts(robot, line), *robot_notices(robot), *home_notices(robot)]
+def _of_table(robot: Robot, line: WireDraws, loads_N: Floats, times_s: Floats) -> list[Notice]:
+    """What speaks against the fits, and where the creep table leaves what was tested."""
+    per_leg = np.broadcast_to(loads_N[:, None], (len(loads_N), robot.legs))
+    any_length = np.full((1, robot.legs), np.nan)  # the table is of a metre of wire
+    return wire_warnings(robot, line, per_leg, float(times_s[-1]), any_length)
+
+
+def _warnings(robot: Robot, contents: Mapping[str, str]) -> list[Notice]:
+    """What speaks against the robot's file, and what could not be exported."""
+    out = [*robot_notices(robot), *home_notices(robot)]
     if "klipper.cfg" not in contents:
         text = "no firmware settings: they exist for four or five drums with a position-only platform"
         out.append(Notice("left-out", text))
