@@ -8,6 +8,7 @@ import pytest
 import wirebayes as wb
 from wirebayes.effects import effect_named
 from wirebayes.model.build import build
+from wirebayes.model.scales import Units
 from wirebayes.result_warnings import Notice
 from wirebayes.results import hold_ends
 from wirebayes.simulation.synthetic import Bench, Truth, draw
@@ -39,15 +40,41 @@ def near(problem, truth):
 def test_the_shift_is_the_distance_to_the_fit_that_knows_the_ends(key, truth):
     effects = [effect_named(key)] if key else []
     unknown, known = (lasting(effects, truth, recorded=r) for r in (False, True))
-    best, one = near(unknown, truth), np.ones(len(unknown.names))
-    told = hold_ends.cost(unknown, best, one)
-    assert told is not None and hold_ends.cost(known, best, one) is None
+    best = near(unknown, truth)
+    draws = around(best)
+    told = hold_ends.cost(unknown, best, draws)
+    assert told is not None and hold_ends.cost(known, best, draws) is None
     before, after = hold_ends._modes(unknown, known, best)
+    own = unknown.in_units(unknown.own_units)
+    spread = unknown.theta_in(own.units, draws).std(axis=0, ddof=1)
     assert list(told["moved"]) == ["k2", *truth]
     for name, move in told["moved"].items():
         i = unknown.names.index(name)
-        assert move["shift"] == pytest.approx(after[i] - before[i], rel=0.02)  # priors follow the holds
-        assert move["sd_share"] == pytest.approx(abs(move["shift"]))
+        moved = np.array([before, before])
+        moved[1, i] = after[i]
+        without, with_it = own.theta_in(unknown.units, moved)
+        assert move["shift"] == pytest.approx(with_it[i] - without[i], rel=0.02)  # priors follow the holds
+        assert move["sd_share"] == pytest.approx(abs(after[i] - before[i]) / spread[i], rel=0.02)
+
+
+def around(best):
+    """Draws of which k2 and N are known together better than each alone, as in a posterior."""
+    steps = np.random.default_rng(0).normal(size=(500, len(best)))
+    return best * np.exp(0.01 * (steps + 2.0 * steps[:, :1]))
+
+
+@pytest.mark.parametrize("time_s", [1 / 32, 32.0, 86400.0])
+def test_what_is_called_a_second_does_not_decide_how_far_k2_moves(time_s):
+    problem = lasting([], {}, recorded=False)
+    best = near(problem, {})
+    draws = around(best)
+    told = hold_ends.cost(problem, best, draws)
+    other = problem.in_units(Units(1.0, 1.0, time_s))
+    (there,) = problem.theta_in(other.units, best[None])
+    otherwise = hold_ends.cost(other, there, problem.theta_in(other.units, draws))
+    one, two = (found["moved"]["k2"] for found in (told, otherwise))
+    assert two["sd_share"] == pytest.approx(one["sd_share"], rel=1e-3)  # climbs end within a tolerance
+    assert np.sign(two["shift"]) == np.sign(one["shift"])
 
 
 def test_the_last_hold_of_a_test_may_end_with_its_last_reading():

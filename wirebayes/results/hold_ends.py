@@ -2,7 +2,8 @@
 
 A hold ends when the next move begins. Where that was not recorded, the wire may have crept on unseen; where nothing was
 read for long before it, the wire may have been let go. The posterior's mode is climbed to once more with longer holds,
-or with holds that end where nothing more was read, and how far it moves is what the assumption may cost.
+or with holds that end where nothing more was read, and how far it moves is what the assumption may cost. How far k2
+moves, at an unchanged N, is judged after a typical hold: its value after one second depends on what is called a second.
 """
 
 from collections.abc import Sequence
@@ -39,7 +40,7 @@ def are_recorded(protocol: Protocol) -> bool:
     return not followed.any() or bool(went_on.any())
 
 
-def cost(problem: Problem, best: Array, spread: Array) -> HoldEnds | None:
+def cost(problem: Problem, best: Array, draws: Array) -> HoldEnds | None:
     """How far parameters would move if a tenth of each hold had passed after its last reading.
 
     Parameters
@@ -48,8 +49,8 @@ def cost(problem: Problem, best: Array, spread: Array) -> HoldEnds | None:
         In whatever units.
     best : (d,) array
         Parameters near the mode, in those units: where both climbs begin.
-    spread : (d,) array
-        Standard deviations of the posterior, to which shifts are compared.
+    draws : (n, d) array
+        Of the posterior, in those units: shifts are compared with their standard deviations.
 
     Returns
     -------
@@ -75,18 +76,31 @@ def cost(problem: Problem, best: Array, spread: Array) -> HoldEnds | None:
     else:
         return None
     otherwise = replace(problem, samples=tuple(samples))
+    own = problem.in_units(problem.own_units)
     before, after = _modes(problem, otherwise, best)
-    moved = _moved(problem, after - before, spread)
+    spread = problem.theta_in(own.units, draws).std(axis=0, ddof=1)
+    shares = np.abs(after - before) / np.maximum(spread, np.finfo(float).tiny)
+    moved = _moved(problem, _shifts(problem, own, before, after), shares)
     sentence = hold_ends_sentence(moved, supposed, advice)
     return {"covered": covered, "moved": moved, "sentence": sentence}
 
 
-def _moved(problem: Problem, shifts: Array, spread: Array) -> dict[str, MovedByHoldEnds]:
+def _shifts(problem: Problem, own: Problem, before: Array, after: Array) -> Array:
+    """(d,) how far each parameter moves in the problem's units, from modes (d,) in the test's own.
+
+    The others stay: what k2 is after one second follows N too, and would move otherwise in another unit of time.
+    """
+    (start,) = own.theta_in(problem.units, before[None])
+    one_each = np.where(np.eye(len(before), dtype=bool), after, before)
+    moved = own.theta_in(problem.units, one_each)
+    return np.diag(moved) - start
+
+
+def _moved(problem: Problem, shifts: Array, shares: Array) -> dict[str, MovedByHoldEnds]:
     """How far each parameter that is reported moves, also in its standard deviations."""
     moved: dict[str, MovedByHoldEnds] = {}
-    for name, shift, sd in zip(problem.names, shifts.tolist(), spread.tolist(), strict=True):
+    for name, shift, share in zip(problem.names, shifts.tolist(), shares.tolist(), strict=True):
         if _is_told(name):
-            share = abs(shift) / max(sd, np.finfo(float).tiny)
             moved[name] = {"shift": shift, "sd_share": share, "unit": _unit(name, problem)}
     return moved
 
@@ -181,7 +195,7 @@ def _shorter(sample: Sample) -> Sample:
 
 
 def _modes(problem: Problem, longer: Problem, best: Array) -> tuple[Array, Array]:
-    """(d,) parameters at the mode that is reached from these, of both problems; what is integrated out stays."""
+    """(d,) parameters in the test's own units at the modes of both problems; what is integrated out stays."""
     own = problem.in_units(problem.own_units)
     target = _density(problem, own)
     other = _density(longer, own)
@@ -196,8 +210,7 @@ def _modes(problem: Problem, longer: Problem, best: Array) -> tuple[Array, Array
         found = climb(density, start, residuals, curvature_at_end=False)
         there = theta.copy()
         there[:, columns] = each.coordinates.to_natural(found.z)
-        (in_given_units,) = own.theta_in(problem.units, there)
-        ends.append(in_given_units)
+        ends.append(there[0])
     return ends[0], ends[1]
 
 

@@ -73,7 +73,7 @@ def _warnings(fit: Fit, sample: Sample | None, ends: HoldEnds | None) -> list[No
 
 def _hold_ends(fit: Fit) -> HoldEnds | None:
     best = fit.flat[int(fit.log_density.argmax())]
-    return hold_ends.cost(fit.problem, best, fit.flat.std(axis=0, ddof=1))
+    return hold_ends.cost(fit.problem, best, fit.flat)
 
 
 def summary_of(fit: Fit, sample: Sample | None) -> SummaryJson:
