@@ -110,7 +110,8 @@ class CalibratedUnknowns(TypedDict):
     """The posterior that ``pose --calibration`` starts from.
 
     `mean` and `covariance` are of the reference errors of all wires (m), the line's parameters (`line` names them;
-    logarithms of those that are positive) and the logarithmic deviations of every wire's own parameters.
+    logarithms of those that are positive) and the logarithmic deviations of every wire's own parameters. Errors of
+    points and drums are among those of the lengths; by `by_pose_mm` they differ from pose to pose.
     """
 
     version: int
@@ -119,6 +120,7 @@ class CalibratedUnknowns(TypedDict):
     line: list[str]
     mean: Numbers
     covariance: Numbers
+    by_pose_mm: Numbers
     session: SessionDone
 
 

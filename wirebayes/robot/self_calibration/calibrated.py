@@ -9,7 +9,7 @@ from wirebayes.json_files.calibrate import CalibratedUnknowns
 from wirebayes.numeric.linear_algebra import solve
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.draws import WireDraws, lines_of, nominal_length
 from wirebayes.robot.mechanics.rotation import matrix, vector
 from wirebayes.robot.motion.creep import CreepState
 from wirebayes.robot.self_calibration import predicted
@@ -30,6 +30,8 @@ class Calibrated:
     mean : (d,) array
         Reference errors, parameters and specimens' deviations in the order of `LengthPrior.moments`, without biases.
     covariance : (d, d) array
+    by_pose_m : (w,) array
+        Standard deviation of how the lengths' errors, those of the points among them, differ from pose to pose.
     """
 
     robot: Robot
@@ -37,6 +39,13 @@ class Calibrated:
     session: Session
     mean: Floats
     covariance: Floats
+    by_pose_m: Floats
+
+    @property
+    def pulls_N(self) -> Floats:
+        """(w,) what lengths that are off by `by_pose_m` make of the wires' tensions at most."""
+        stiffness_N = [line.parameters["k1"].mean() for line in lines_of(self.robot, self.prior.line)]
+        return np.array(stiffness_N) * self.by_pose_m / nominal_length(self.robot)
 
     @property
     def reference_sd_m(self) -> Floats:
@@ -63,32 +72,40 @@ def calibrated(found: RobotPosterior, session: Session) -> Calibrated:
     _, root = unknowns.moments
     own = replace(unknowns.prior, bias_sd_N=0.0)
     d = len(own.moments(unknowns.robot.legs)[0])
-    covariance = root @ _with_geometry(found) @ root.T
+    as_lengths = _as_lengths(found)
+    covariance = root @ _mean_covariance(as_lengths, found) @ root.T
     there = replace(session, position_m=state.position_m, rotation=state.rotation)
-    return Calibrated(unknowns.robot, own, there, unknowns.parts(state.white).wires[:d], covariance[:d, :d])
+    mean = unknowns.parts(state.white).wires[:d]
+    from_mean = as_lengths - as_lengths.mean(0)
+    scatter = np.diag(_mean_covariance(from_mean, found))
+    by_pose_m = own.reference_sd_m * np.sqrt(np.maximum(scatter[: unknowns.robot.legs], 0.0))
+    return Calibrated(unknowns.robot, own, there, mean, covariance[:d, :d], by_pose_m)
 
 
-def _with_geometry(found: RobotPosterior) -> Floats:
-    """Covariance ``(d, d)`` of references and wires in units of their prior, errors of points and drums included.
+def _as_lengths(found: RobotPosterior) -> Floats:
+    """References and wires by all unknowns at each pose, ``(p, d, m)``: errors of points and drums as those of lengths.
 
     A point that is off makes its wire's way longer or shorter, as an error of the reference does, but from pose to pose
-    by another amount. The readings often tell the sum of both well, and neither alone. So the sum counts, averaged over
-    the poses of the session.
+    by another amount. The readings often tell the sum of both well, and neither alone.
     """
     unknowns = found.unknowns
     wires = unknowns.slices["wires"]
     if wires.start == 0:  # points and drums are exact
-        return found.covariance[wires, wires]
+        return np.eye(unknowns.of_wires, unknowns.count)[None]
     loop = found.equations.by_robot[:, found.equations.rows["loop"]]
-    first = unknowns.references.start - wires.start
-    references = slice(first, first + unknowns.robot.legs)
     by_reference = loop[..., unknowns.references]
-    one = np.zeros((len(loop), unknowns.of_wires, unknowns.count))
-    one[:, :, wires] = np.eye(unknowns.of_wires)
+    out = np.zeros((len(loop), unknowns.of_wires, unknowns.count))
+    out[:, :, wires] = np.eye(unknowns.of_wires)
     for name in ("exit", "platform", "drum"):
         part = unknowns.slices[name]
-        one[:, references, part] = solve(by_reference, loop[..., part])
-    return np.asarray((one @ found.covariance @ one.mT).mean(0))
+        if part.stop > part.start:
+            out[:, : unknowns.robot.legs, part] = solve(by_reference, loop[..., part])
+    return out
+
+
+def _mean_covariance(by_unknowns: Floats, found: RobotPosterior) -> Floats:
+    """Covariance ``(d, d)``, averaged over poses, of what follows all unknowns linearly by ``(p, d, m)``."""
+    return np.asarray((by_unknowns @ found.covariance @ by_unknowns.mT).mean(0))
 
 
 def to_dict(found: Calibrated) -> CalibratedUnknowns:
@@ -101,6 +118,7 @@ def to_dict(found: Calibrated) -> CalibratedUnknowns:
         "line": found.prior.names,
         "mean": found.mean,
         "covariance": found.covariance,
+        "by_pose_mm": 1e3 * found.by_pose_m,
         "session": {
             "position_m": session.position_m,
             "rotation_vector_rad": vector(session.rotation),
@@ -128,10 +146,11 @@ def from_dict(values: Any, robot: Robot, line: WireDraws) -> Calibrated:
     prior = LengthPrior(line, 1e-3 * float(values["reference_sd_mm"]), float(values["specimen_spread"]))
     mean = np.array(values["mean"], float)
     covariance = np.array(values["covariance"], float)
+    by_pose_m = 1e-3 * np.array(values["by_pose_mm"], float)
     d = len(prior.moments(robot.legs)[0])
     if list(values["line"]) != prior.names or mean.shape != (d,) or covariance.shape != (d, d):
         raise ValueError("other unknowns")
-    return Calibrated(robot, prior, _session(values["session"], robot), mean, covariance)
+    return Calibrated(robot, prior, _session(values["session"], robot), mean, covariance, by_pose_m)
 
 
 def _session(values: Any, robot: Robot) -> Session:
