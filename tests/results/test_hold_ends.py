@@ -45,16 +45,17 @@ def test_the_shift_is_the_distance_to_the_fit_that_knows_the_ends(key, truth):
     told = hold_ends.cost(unknown, best, draws)
     assert told is not None and hold_ends.cost(known, best, draws) is None
     before, after = hold_ends._modes(unknown, known, best)
-    own = unknown.in_units(unknown.own_units)
-    spread = unknown.theta_in(own.units, draws).std(axis=0, ddof=1)
+    early = hold_ends._early(unknown)
+    before, after = unknown.in_units(unknown.own_units).theta_in(early, np.array([before, after]))
+    spread = unknown.theta_in(early, draws).std(axis=0, ddof=1)
     assert list(told["moved"]) == ["k2", *truth]
     for name, move in told["moved"].items():
         i = unknown.names.index(name)
-        moved = np.array([before, before])
-        moved[1, i] = after[i]
-        without, with_it = own.theta_in(unknown.units, moved)
-        assert move["shift"] == pytest.approx(with_it[i] - without[i], rel=0.02)  # priors follow the holds
-        assert move["sd_share"] == pytest.approx(abs(after[i] - before[i]) / spread[i], rel=0.02)
+        shift = after[i] - before[i]
+        unit = 1.0 if name == "k2" else early.length_mm
+        assert move["shift"] == pytest.approx(shift * unit, rel=0.02)  # priors follow the holds
+        assert move["sd_share"] == pytest.approx(abs(shift) / spread[i], rel=0.02)
+    assert told["moved"]["k2"]["quantity"] == "k2 t^N after 0.9 s"
 
 
 def around(best):
@@ -74,7 +75,8 @@ def test_what_is_called_a_second_does_not_decide_how_far_k2_moves(time_s):
     otherwise = hold_ends.cost(other, there, problem.theta_in(other.units, draws))
     one, two = (found["moved"]["k2"] for found in (told, otherwise))
     assert two["sd_share"] == pytest.approx(one["sd_share"], rel=1e-3)  # climbs end within a tolerance
-    assert np.sign(two["shift"]) == np.sign(one["shift"])
+    assert two["shift"] == pytest.approx(one["shift"], rel=1e-3)
+    assert two["quantity"] == one["quantity"]
 
 
 def test_the_last_hold_of_a_test_may_end_with_its_last_reading():
@@ -93,12 +95,18 @@ def test_the_last_hold_of_a_test_may_end_with_its_last_reading():
     ("share", "words"), [(0.49, "k2 would move by less than 0.5"), (0.51, "k2 would be lower by 0.00300 s⁻ᴺ (0.5")]
 )
 def test_a_small_shift_is_said_to_be_small(share, words):
-    assert words in hold_ends.hold_ends_sentence({"k2": {"shift": -0.003, "sd_share": share, "unit": "s^-N"}})
+    assert words in hold_ends.hold_ends_sentence(
+        {"k2": {"quantity": "k2", "shift": -0.003, "sd_share": share, "unit": "s^-N"}}
+    )
 
 
 @pytest.mark.parametrize(("share", "warned"), [(0.99, False), (1.01, True)])
 def test_a_shift_of_a_standard_deviation_is_warned_of(share, warned):
-    told = {"covered": 0.9, "moved": {"k2": {"shift": 0.1, "sd_share": share, "unit": "s^-N"}}, "sentence": "as it is"}
+    told = {
+        "covered": 0.9,
+        "moved": {"k2": {"quantity": "k2", "shift": 0.1, "sd_share": share, "unit": "s^-N"}},
+        "sentence": "as it is",
+    }
     assert hold_ends.hold_ends_notice(told) == [Notice("hold-ends", "as it is")] * warned
     assert hold_ends.hold_ends_notice(None) == []
 
@@ -121,7 +129,7 @@ def test_a_long_rest_is_a_part_of_its_hold_only_where_it_stayed_as_set():
     (warning,) = checked["warnings"]
     assert warning["kind"] == "hold-ends"
     assert "8, 9 and 10 (up to 20 min) went on long after the last reading" in warning["text"]
-    assert "had nothing followed that reading, k2 would be higher by" in warning["text"]
+    assert "had nothing followed that reading, k2 t^N after 12.9 s would be higher by" in warning["text"]
     assert wb.check(with_rests(until_s=130.0)).summary()["warnings"] == []
 
 

@@ -4,8 +4,13 @@ from typing import TypedDict
 
 
 class MovedByHoldEnds(TypedDict):
-    """How far the best value of a parameter moves; `sd_share` in standard deviations of its posterior."""
+    """How far the best value of a quantity moves; `sd_share` in standard deviations of its posterior.
 
+    `quantity` is the parameter itself, but for k2, whose value depends on the unit of time: there it is k2 t^N after a
+    hundredth of a typical hold.
+    """
+
+    quantity: str
     shift: float
     sd_share: float
     unit: str

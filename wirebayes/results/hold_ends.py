@@ -2,8 +2,8 @@
 
 A hold ends when the next move begins. Where that was not recorded, the wire may have crept on unseen; where nothing was
 read for long before it, the wire may have been let go. The posterior's mode is climbed to once more with longer holds,
-or with holds that end where nothing more was read, and how far it moves is what the assumption may cost. How far k2
-moves, at an unchanged N, is judged after a typical hold: its value after one second depends on what is called a second.
+or with holds that end where nothing more was read, and how far it moves is what the assumption may cost. Of k2 it is
+said of k2 t^N early in a hold: how far the rate after one second moves depends on what is called a second.
 """
 
 from collections.abc import Sequence
@@ -15,19 +15,20 @@ from wirebayes.inference.climb import climb
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.io.unread_ends import unread_s
 from wirebayes.json_files.hold_ends import HoldEnds, MovedByHoldEnds
-from wirebayes.json_files.values import UNITS
-from wirebayes.model.column_units import parameter_of, unit_of_column
+from wirebayes.model.column_units import parameter_of, unit_of_column, units_ratio
 from wirebayes.model.linear_amplitudes import integrated
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Sample
+from wirebayes.model.scales import NATURAL, Units
 from wirebayes.numeric.typing import Array
 from wirebayes.result_warnings import Notice
-from wirebayes.sentences import holds_in_words, lasting, listed, number, unit_text
+from wirebayes.sentences import holds_in_words, lasting, listed, number, short, unit_text
 from wirebayes.wire.protocol import Protocol
 
 COVERED = 0.9  # of each hold, by its readings: a tenth is a rest of 13 s after two minutes, as moving by hand takes
 SHIFTED = 0.5  # standard deviations from which a shift is worth a word: 90 % intervals then hold the truth in 86 %
 MATTERS = 1.0  # standard deviations from which it is worth a warning: they then hold it in 74 %
+EARLY = 0.01  # of a typical hold: about the second after which k2 is the rate, in holds of two minutes
 _LONGER = "each hold is taken to end with its last reading: had a tenth of each passed after it,"
 _RECORD = "a row without a reading says when a hold ended"
 _LET_GO = "if it did not stay so, say what it did with unrecorded_holds"
@@ -77,31 +78,34 @@ def cost(problem: Problem, best: Array, draws: Array) -> HoldEnds | None:
         return None
     otherwise = replace(problem, samples=tuple(samples))
     own = problem.in_units(problem.own_units)
-    before, after = _modes(problem, otherwise, best)
-    spread = problem.theta_in(own.units, draws).std(axis=0, ddof=1)
-    shares = np.abs(after - before) / np.maximum(spread, np.finfo(float).tiny)
-    moved = _moved(problem, _shifts(problem, own, before, after), shares)
+    early = _early(problem)
+    before, after = own.theta_in(early, np.array(_modes(problem, otherwise, best)))
+    spread = problem.theta_in(early, draws).std(axis=0, ddof=1)
+    moved = _moved(problem, early, after - before, spread)
     sentence = hold_ends_sentence(moved, supposed, advice)
     return {"covered": covered, "moved": moved, "sentence": sentence}
 
 
-def _shifts(problem: Problem, own: Problem, before: Array, after: Array) -> Array:
-    """(d,) how far each parameter moves in the problem's units, from modes (d,) in the test's own.
-
-    The others stay: what k2 is after one second follows N too, and would move otherwise in another unit of time.
-    """
-    (start,) = own.theta_in(problem.units, before[None])
-    one_each = np.where(np.eye(len(before), dtype=bool), after, before)
-    moved = own.theta_in(problem.units, one_each)
-    return np.diag(moved) - start
+def _early(problem: Problem) -> Units:
+    """Units of the test in which k2 is the rate early in a hold."""
+    typical = NATURAL if problem.scales is None else problem.scales.units
+    return replace(typical, time_s=EARLY * typical.time_s)
 
 
-def _moved(problem: Problem, shifts: Array, shares: Array) -> dict[str, MovedByHoldEnds]:
-    """How far each parameter that is reported moves, also in its standard deviations."""
+def _moved(problem: Problem, units: Units, shifts: Array, spread: Array) -> dict[str, MovedByHoldEnds]:
+    """How far each told parameter moves, from shifts and standard deviations (d,) in the units of `_early`."""
     moved: dict[str, MovedByHoldEnds] = {}
-    for name, shift, share in zip(problem.names, shifts.tolist(), shares.tolist(), strict=True):
-        if _is_told(name):
-            moved[name] = {"shift": shift, "sd_share": share, "unit": _unit(name, problem)}
+    for name, shift, sd in zip(problem.names, shifts.tolist(), spread.tolist(), strict=True):
+        if not _is_told(name):
+            continue
+        share = abs(shift) / max(sd, np.finfo(float).tiny)
+        if parameter_of(name) == "k2":
+            quantity = f"{name} t^N after {short(units.time_s, 3)} s"
+            moved[name] = {"quantity": quantity, "shift": shift, "sd_share": share, "unit": "1"}
+            continue
+        unit = unit_of_column(name, problem.samples)
+        in_given_unit = shift * units_ratio(unit, units, problem.units)
+        moved[name] = {"quantity": name, "shift": in_given_unit, "sd_share": share, "unit": unit}
     return moved
 
 
@@ -150,10 +154,6 @@ def _is_told(column: str) -> bool:
     return "." in column and not column.startswith("discrepancy.")
 
 
-def _unit(column: str, problem: Problem) -> str:
-    return UNITS.get(parameter_of(column)) or unit_of_column(column, problem.samples)
-
-
 def hold_ends_sentence(moved: dict[str, MovedByHoldEnds], supposed: str = _LONGER, advice: str = _RECORD) -> str:
     """What the assumption may cost, in words.
 
@@ -164,14 +164,15 @@ def hold_ends_sentence(moved: dict[str, MovedByHoldEnds], supposed: str = _LONGE
     supposed, advice : str
         What is taken for granted and what else may have been, and what to write where it was otherwise.
     """
-    far = {name: move for name, move in moved.items() if move["sd_share"] >= SHIFTED}
+    far = [move for move in moved.values() if move["sd_share"] >= SHIFTED]
     if not far:
-        return f"{supposed} {listed(list(moved), 'or')} would move by less than {SHIFTED:g} standard deviations"
+        quantities = [move["quantity"] for move in moved.values()]
+        return f"{supposed} {listed(quantities, 'or')} would move by less than {SHIFTED:g} standard deviations"
     each = []
-    for name, move in far.items():
+    for move in far:
         way = "lower" if move["shift"] < 0 else "higher"
         size = f"{number(abs(move['shift']))} {unit_text(move['unit'])}".strip()
-        each.append(f"{name} would be {way} by {size} ({move['sd_share']:.1f} of its standard deviation)")
+        each.append(f"{move['quantity']} would be {way} by {size} ({move['sd_share']:.1f} of its standard deviation)")
     return f"{supposed} {listed(each)}; {advice}"
 
 
