@@ -66,8 +66,19 @@ def of_calibration(found: CalibrateJson) -> list[str]:
     lengths = ", ".join(f"{mean:.5f} [{low:.5f}, {high:.5f}]" for mean, low, high in rows)
     lines = [f"{found['robot']}: zero-tension lengths in m: {lengths}"]
     lines += _exit_points(found["exit_points_m"])
+    lines += [f"  {text}" for text in drums_in_words(found)]
     open_ = found["identified"]["not_determined"]
     return lines + [f"  not determined: {text}" for text in open_[:_MOST_OPEN]]
+
+
+def drums_in_words(found: CalibrateJson) -> list[str]:
+    """A clause about the radii of the drums, if they were estimated."""
+    if "drum_wider_percent" not in found:
+        return []
+    wider = found["drum_wider_percent"]
+    pairs = zip(wider["mean"], wider["sd"], strict=True)
+    each = ", ".join(f"{mean:+.2f} ± {short(sd, 2)}" for mean, sd in pairs)
+    return [f"radii of the drums, % beyond those that the joint values were computed with: {each}"]
 
 
 def _exit_points(points: MeanAndSd) -> list[str]:

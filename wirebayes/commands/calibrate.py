@@ -373,6 +373,7 @@ def _check_usable(folder: Path, name: str) -> None:
         of_robot = str(found["robot"])
         converged = bool(found["with_creep_model"]["converged"])
         usable = bool(found["usable"])
+        has_drums = "drum_wider_percent" in found
         kinds = sorted({notice["kind"] for notice in found["warnings"]})
     if of_robot != name:
         raise InputError(f"--calibration: found one of {of_robot} in {folder}, {expected}")
@@ -383,6 +384,11 @@ def _check_usable(folder: Path, name: str) -> None:
         raise InputError(
             f"--calibration: found one that says it is not usable in {folder}{reasons}, "
             f"expected a calibration of {name} that may be set in a controller"
+        )
+    if has_drums:  # nobody knows which radii later joint values are computed with
+        raise InputError(
+            f"--calibration: found one with --drum-sd in {folder}, expected one without: set the radii that {summary} "
+            "gives (drum_wider_percent) in the controller and calibrate again"
         )
 
 

@@ -111,7 +111,7 @@ class CalibratedUnknowns(TypedDict):
 
     `mean` and `covariance` are of the reference errors of all wires (m), the line's parameters (`line` names them;
     logarithms of those that are positive) and the logarithmic deviations of every wire's own parameters. Errors of
-    points and drums are among those of the lengths; by `by_pose_mm` they differ from pose to pose.
+    points are among those of the lengths; by `by_pose_mm` they differ from pose to pose.
     """
 
     version: int
@@ -146,6 +146,12 @@ class NamedEstimates(TypedDict):
     identified: IdentifiedJson
 
 
+class EstimatedDrums(TypedDict):
+    """How much wider the drum of each leg is than the robot's file says, where ``--drum-sd`` asks for it."""
+
+    drum_wider_percent: NotRequired[Interval]
+
+
 class SensorsAtFault(TypedDict):
     """Tension sensors one of which would explain what contradicts, with the error that it would have.
 
@@ -166,7 +172,7 @@ class JointErrors(TypedDict):
     joint_sd_mm: float | None
 
 
-class CalibrateJson(CalibratedPoses, Observed, NamedEstimates, JointErrors, Warned):
+class CalibrateJson(CalibratedPoses, Observed, NamedEstimates, EstimatedDrums, JointErrors, Warned):
     """The whole file."""
 
     next_pose_sd_mm: Numbers

@@ -9,7 +9,7 @@ from wirebayes.json_files.values import Band, MeanAndSd, Numbers
 class CalibratedStart(TypedDict):
     """The session that the history goes on from, and what it left known of the wires' reference lengths.
 
-    Errors of points and drums that it estimated are among those of the lengths, as far as they come to the same.
+    Errors of points that it estimated are among those of the lengths, as far as they come to the same.
     """
 
     holds: int

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from wirebayes.answers.headline import calibration_in_a_sentence
+from wirebayes.answers.robot import drums_in_words
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.calibrate import CalibrateJson, EstimatedLengths, Interval
 from wirebayes.report.blocks import (
@@ -95,10 +96,11 @@ def _geometry(found: CalibrateJson) -> list[Section]:
         *_points(found["exit_points_m"], "exit point"),
         *_points(found["platform_points_m"], "platform point"),
     ]
-    if not tables:
+    if not tables and "drum_wider_percent" not in found:
         return []
     seen = found["identified"]
     words = [f"The readings determine {seen['determined']} of {seen['of']} combinations of geometry and references."]
+    words += [f"{text[0].upper()}{text[1:]}." for text in drums_in_words(found)]
     words += [f"Not determined: {text}." for text in seen["not_determined"]]
     known = Columns([Points("What the readings determine", words)])
     return [Section("Geometry", [*tables, known]), Section("Poses", [_poses(found)])]

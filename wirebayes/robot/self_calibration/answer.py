@@ -8,6 +8,7 @@ from wirebayes.json_files.calibrate import (
     CalibratedPoses,
     CalibrateJson,
     CalibrationPrior,
+    EstimatedDrums,
     EstimatedLengths,
     EstimatedPoses,
     IdentifiedJson,
@@ -123,6 +124,7 @@ def calibration_report(
         "platform_points_m": interval_about(*s.platform_m),
         "zero_tension_lengths_m": interval_about(*s.length_m),
         "references_m": interval_about(*s.reference_m),
+        **_drums(errors, s),
         "poses": _poses(s, session),
         "misfit": misfit(found),
         **_joint_errors(found),
@@ -188,6 +190,14 @@ def _prior(prior: LengthPrior, errors: StatedErrors, session: Session) -> Calibr
         known["tension_bias_sd_N"] = prior.bias_sd_N
         known["tension_bias_sign"] = "constant" if session.motion is None else "motion"
     return known
+
+
+def _drums(errors: StatedErrors, summary: Summary) -> EstimatedDrums:
+    """How much wider each leg's drum is than the robot's file says, where that was estimated."""
+    if not errors.drum > 0:
+        return {}
+    drum = summary.drum
+    return {"drum_wider_percent": interval_about(100 * drum.mean, 100 * drum.sd, drum.half)}
 
 
 def _poses(summary: Summary, session: Session) -> EstimatedPoses:
@@ -289,7 +299,8 @@ def joint_values_to(found: RobotPosterior, position_m: Floats, turn: Floats) -> 
     tau = inverse.tensions(there, *pose)
     strain = found.creep.strain[-1][:, None]
     reference = parts.reference_m[:, None]
-    return inverse.commands(there, wires, *pose, tau, strain, reference).joint_m[0]
+    drawn_m = inverse.commands(there, wires, *pose, tau, strain, reference).joint_m[0]
+    return drawn_m / (1.0 + parts.drum)
 
 
 def _warnings(verdict: _Verdict) -> list[Notice]:

@@ -63,8 +63,8 @@ def calibrated(found: RobotPosterior, session: Session) -> Calibrated:
     Parameters
     ----------
     found : RobotPosterior
-        Biases of its sensors are averaged over. Errors of its geometry stand as those errors of the lengths that come
-        to the same, for a history is followed on one robot, the calibrated one.
+        With drums that are exact. Biases of its sensors are averaged over. Errors of its geometry stand as those errors
+        of the lengths that come to the same, for a history is followed on one robot, the calibrated one.
     session : Session
     """
     unknowns = found.unknowns
@@ -83,20 +83,20 @@ def calibrated(found: RobotPosterior, session: Session) -> Calibrated:
 
 
 def _as_lengths(found: RobotPosterior) -> Floats:
-    """References and wires by all unknowns at each pose, ``(p, d, m)``: errors of points and drums as those of lengths.
+    """References and wires by all unknowns at each pose, ``(p, d, m)``: errors of points as those of lengths.
 
     A point that is off makes its wire's way longer or shorter, as an error of the reference does, but from pose to pose
     by another amount. The readings often tell the sum of both well, and neither alone.
     """
     unknowns = found.unknowns
     wires = unknowns.slices["wires"]
-    if wires.start == 0:  # points and drums are exact
+    if wires.start == 0:  # points are exact
         return np.eye(unknowns.of_wires, unknowns.count)[None]
     loop = found.equations.by_robot[:, found.equations.rows["loop"]]
     by_reference = loop[..., unknowns.references]
     out = np.zeros((len(loop), unknowns.of_wires, unknowns.count))
     out[:, :, wires] = np.eye(unknowns.of_wires)
-    for name in ("exit", "platform", "drum"):
+    for name in ("exit", "platform"):
         part = unknowns.slices[name]
         if part.stop > part.start:
             out[:, : unknowns.robot.legs, part] = solve(by_reference, loop[..., part])
