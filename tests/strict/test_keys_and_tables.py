@@ -48,7 +48,7 @@ def test_tables_of_a_list_are_counted_and_found_by_line():
     text = "[[leg]]\nx = 1\n[[leg]]\nx = -1\n"
     with pytest.raises(InputError, match=r"^file.toml, line 4, leg 2, key x: found -1, expected"):
         [leg.number("x", least=0) for leg in keys(text).tables("leg", least=2)]
-    with pytest.raises(InputError, match=r"expected at least two \[\[leg\]\]"):
+    with pytest.raises(InputError, match=r"found 1 \[\[leg\]\], expected at least two \[\[leg\]\]"):
         keys("[[leg]]\nx = 1\n").tables("leg", least=2)
 
 

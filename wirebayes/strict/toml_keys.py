@@ -97,7 +97,8 @@ class Keys:
             raise self.complain(kind, "a single table", expected)
         are_tables = isinstance(given, list) and all(isinstance(table, dict) for table in given)
         if not are_tables or len(given) < least:
-            raise self.complain(kind, shown(given), expected)
+            found = f"{len(given)} [[{kind}]]" if are_tables and given else shown(given)
+            raise self.complain(kind, found, expected)
         tables = []
         for index, table in enumerate(given):
             name = _called(table, index)
