@@ -221,6 +221,19 @@ def test_setting_errors_of_the_past_follow_their_normal_given_the_readings() -> 
     assert root @ root.T == pytest.approx(left, rel=1e-6, abs=1e-9)
 
 
+def test_the_last_bit_of_a_slope_does_not_change_what_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Holds that are known equally well have eigenvalues that are, and eigenvectors that any rounding turns."""
+    own = {"setting_sd": np.array([0.1])}
+    rng = np.random.default_rng(0)
+    drawn = []
+    for _ in range(2):
+        rounding = 1e-13 * rng.normal(size=(5, 5))
+        square = 40.0 * np.eye(5) + rounding + rounding.T
+        monkeypatch.setattr(predictive, "_normal_equations", lambda own, sample, of=square: (of[None], np.ones((1, 5))))
+        drawn.append(settings_given_readings(own, None, np.random.default_rng(1)))  # type: ignore[arg-type]
+    assert drawn[1] == pytest.approx(drawn[0], rel=1e-10)
+
+
 @pytest.mark.parametrize("key", [None, "superposition"])
 def test_a_replicate_has_an_error_of_its_own_and_the_past_goes_on_as_the_readings_say(
     key: str | None, monkeypatch: pytest.MonkeyPatch

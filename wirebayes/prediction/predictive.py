@@ -167,7 +167,9 @@ def settings_given_readings(own: Theta, sample: Sample, rng: Generator) -> Float
     eigen, vectors = eigh(square)
     precision = 1.0 + np.maximum(eigen, 0.0)
     mean = np.einsum("nij,ni->nj", vectors, right) / precision
-    spread = rng.normal(size=right.shape) / np.sqrt(precision)
+    # along the axes of holds: where two eigenvalues are nearly equal, the last bit decides where their vectors point
+    normal = np.einsum("nij,ni->nj", vectors, rng.normal(size=right.shape))
+    spread = normal / np.sqrt(precision)
     drawn: Floats = np.einsum("nij,nj->in", vectors, mean + spread) * own["setting_sd"]
     return drawn
 
