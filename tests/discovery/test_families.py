@@ -71,7 +71,8 @@ def test_a_family_is_said_as_a_person_who_tests_lines_would() -> None:
     assert (
         family_sentence(found) == "the elastic curve is bent: strain stiffening 83 %, sensor nonlinearity 8 %, toe 6 %"
     )
-    assert family_sentence({"screw_wobble": 0.9}) == "there is screw wobble: screw wobble 90 %"
+    assert family_sentence({"screw_wobble": 0.9}) == "there is screw wobble, 90 %"
+    assert family_sentence({"screw_wobble": 1.0}) == "there is screw wobble"
     assert family_sentence({"toe": 0.996, "power_strain": 0.003}) == "the elastic curve is bent: toe"
 
 

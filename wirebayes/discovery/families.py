@@ -163,6 +163,10 @@ def family_sentence(members: Mapping[str, float], *, again: bool = False) -> str
     if again:
         pattern += ", in another way"
     shares = {name.replace("_", " "): p for name, p in members.items() if p >= _WORTH_SAYING}
+    if label in members:  # one effect alone, whose name has been said
+        share = members[label]
+        is_open = _WORTH_SAYING <= share <= _CERTAIN
+        return f"{pattern}, {100 * share:.0f} %" if is_open else pattern
     said = [name if p > _CERTAIN else f"{name} {100 * p:.0f} %" for name, p in shares.items()]
     return f"{pattern}: {', '.join(said)}" if said else pattern
 
