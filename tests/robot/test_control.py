@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.robot import cases
-from tests.robot.lines import STRONGER, line_about
+from tests.robot.lines import CORE, STRONGER, line_about
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.motion import claim, control, inverse
 from wirebayes.robot.motion.creep import HoldCreep, fresh
@@ -177,3 +177,36 @@ def test_a_hold_is_not_followed_when_too_many_platforms_have_fallen():
     enough = CreepingHold(robot, wires, joint, (robot.home_m, np.eye(3)), needed=0.9)
     enough.to(600.0)
     assert enough.creep.time_s == 600.0
+
+
+def test_wires_that_begin_to_pull_by_creep_that_decides_nothing_take_no_tiny_steps(monkeypatch):
+    """Three of four wires hang loose, as by a bound of 0 N; what is left of the creep after an hour tightens them."""
+    whole = schema.read_robot_file("hangprinter-4")
+    robot = replace(whole, rule=replace(whole.rule, lowest_N=0.0))
+    line = line_about(CORE | {"N": 0.75}, 0.05, 6)
+    wires = draws.for_robot(robot, line, 0.05, np.random.default_rng(0))
+    x, R = robot.home_m, np.eye(3)
+    tau = np.repeat(inverse.tensions(robot, x[None], R[None]).T, 6, 1)
+    loaded = HoldCreep(wires, fresh(robot.legs, 6), tau).advance(3600.0, tau)
+    _, foreseen = control.calibrated_schedules(robot, wires, loaded, x, R)
+    times = np.array([1.0, 10.0, 100.0, 2000.0])
+    limits = control.Limits(x, R, 1e-3)
+    found = []
+    steps = []
+    for unseen in (0.0, control._UNSEEN):
+        monkeypatch.setattr(control, "_UNSEEN", unseen)
+        tried = []
+        monkeypatch.setattr(CreepingHold, "_try", counted(CreepingHold._try, tried))
+        found.append(control.lasting_within(robot, wires, foreseen, limits, times, loaded))
+        monkeypatch.undo()
+        steps.append(len(tried))
+    assert found[0] == found[1]
+    assert steps[1] < steps[0] / 5
+
+
+def counted(function, calls):
+    def call(*arguments):
+        calls.append(arguments)
+        return function(*arguments)
+
+    return call

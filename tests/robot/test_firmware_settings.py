@@ -40,6 +40,21 @@ def test_a_config_by_hand(tmp_path):
     assert (robot.rule.lowest_N, robot.rule.highest_N) == (10.0, 120.0)
 
 
+def test_a_negative_length_beyond_the_anchors_puts_the_spools_at_the_last_anchor(tmp_path):
+    """As in the firmware, which computes these lengths then: M666 Y-1:-1:-1:-1 is what printers are shipped with."""
+    (tmp_path / "config.g").write_text(RRF.replace("Y310:320:330:0", "Y-1:-1:-1:-1"))
+    robot = schema.read_robot_file(import_robot(tmp_path / "config.g", tmp_path / "robot.toml"))
+    of_a = np.sqrt(1.62**2 + 2.5**2)
+    np.testing.assert_allclose(robot.beyond_m[[0, 3]], [of_a, 0.0])
+
+
+@pytest.mark.parametrize(("given", "said"), [("M666 Y0:0:0:0", False), ("", True)])
+def test_settings_that_do_not_say_how_much_wire_lies_beyond_the_anchors_are_said_to(given, said, tmp_path):
+    (tmp_path / "config.g").write_text(RRF.replace("M666 Y310:320:330:0", given))
+    text = import_robot(tmp_path / "config.g", tmp_path / "robot.toml").read_text()
+    assert ("do not say how much wire" in text) == said
+
+
 def test_anchors_in_metres_are_refused_in_both_formats(tmp_path):
     anchors = "A0:-1.62:-.15 B1.8:.9:-.15 C-1.62:.9:-.15 D0:0:2.35"
     metres = RRF.replace("A0:-1620:-150 B1800:900:-150 C-1620:900:-150 D0:0:2350", anchors)
@@ -58,7 +73,8 @@ def test_anchors_in_metres_are_refused_in_both_formats(tmp_path):
         (("D0:0:2350", ""), "found no M669 D"),
         (("D0:0:2350", "D0:2350"), "line 2, M669 D: found 2 numbers, expected x:y:z"),
         (("W2.5", ""), "found no weight of the mover"),
-        (("U2:2:2:4", "U2:2:4"), "line 3, lines: found 3 numbers"),
+        (("W2.5", "W0"), "line 3, M666 W: found 0, expected the weight of the mover"),
+        (("U2:2:2:4", "U2:2:4"), "line 3, M666 U: found 3 numbers"),
     ],
 )
 def test_what_is_missing_is_said_with_its_line(tmp_path, change, message):

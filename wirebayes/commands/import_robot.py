@@ -82,7 +82,7 @@ def import_robot(
     if target.exists():
         raise InputError(f"{target}: found a file of this name, expected none; nothing is overwritten")
     text = robot_file(found, (lowest, highest), np.asarray(where))
-    schema.parse(text, str(first))
+    schema.parse(text, f"{first}, turned into a robot file")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         write_text(target, text)

@@ -28,10 +28,11 @@ _SMALLEST_MM = 20.0  # no printer's anchors lie so near to one another; those of
 
 @dataclass
 class _Settings:
-    """Values by name, with the line they were found in."""
+    """Values by name, with the line they were found in, and the file's own word for them."""
 
     values: dict[str, list[float]] = field(default_factory=dict)
     line: dict[str, int] = field(default_factory=dict)
+    word: dict[str, str] = field(default_factory=dict)
 
     def put(self, name: str, text: str, separator: str, where: str, line: int) -> None:
         """Keep numbers under a name.
@@ -54,6 +55,18 @@ class _Settings:
         except ValueError:
             raise InputError(f"{where}, line {line}, {name}: found {text!r}, expected numbers") from None
         self.line[name] = line
+        self.word[name] = name
+
+    def rename(self, word: str, name: str) -> None:
+        """Find what stands under a word of the file by another name, too."""
+        if word in self.values:
+            self.values[name] = self.values[word]
+            self.line[name] = self.line[word]
+            self.word[name] = word
+
+    def where(self, name: str) -> str:
+        """The line and the word of a value."""
+        return f"line {self.line[name]}, {self.word[name]}"
 
 
 def robot_of_firmware(path: Path) -> ImportedRobot:
@@ -81,12 +94,8 @@ def _reprapfirmware(text: str, where: str) -> tuple[list[list[float]], _Settings
     names = [f"M669 {letter}" for letter in _ANCHORS[:count]]
     anchors = _anchors(found, names, where, "M669 with A, B, C, D")
     renamed = {"U": "lines", "O": "on spool", "W": "mass", "Y": "beyond", "I": "least", "X": "most"}
-    values, line = found.values, found.line
     for letter, name in renamed.items():
-        code = f"M666 {letter}"
-        if code in values:
-            values[name] = values[code]
-            line[name] = line[code]
+        found.rename(f"M666 {letter}", name)
     return anchors, found
 
 
@@ -119,7 +128,9 @@ def _klipper(text: str, where: str) -> tuple[list[list[float]], _Settings]:
         if section.startswith("stepper_") and key.startswith("anchor_"):
             found.put(f"{section} {key}", value, ",", where, number)
         elif section == "printer" and key in renamed:
-            found.put(renamed[key], value, ",", where, number)
+            found.put(key, value, ",", where, number)
+    for key, name in renamed.items():
+        found.rename(key, name)
     anchors = []
     for letter in _STEPPERS:
         names = [f"stepper_{letter} anchor_{axis}" for axis in "xyz"]
@@ -141,8 +152,7 @@ def _anchors(found: _Settings, names: list[str], where: str, expected: str) -> l
     out = [found.values[name] for name in names]
     for name, value in zip(names, out, strict=True):
         if len(value) != 3:
-            line = found.line[name]
-            raise InputError(f"{where}, line {line}, {name}: found {len(value)} numbers, expected x:y:z in mm")
+            raise InputError(f"{where}, {found.where(name)}: found {len(value)} numbers, expected x:y:z in mm")
     return out
 
 
@@ -154,22 +164,22 @@ def _of(path: Path, firmware: str, anchors: list[list[float]], found: _Settings)
         value = settings.get(name, [missing])
         if len(value) not in (1, legs):
             raise InputError(
-                f"{path}, line {found.line[name]}, {name}: found {len(value)} numbers, expected one, or one of each of "
-                f"{legs} wires"
+                f"{path}, {found.where(name)}: found {len(value)} numbers, expected one, or one of each of {legs} wires"
             )
         return np.broadcast_to(np.array(value, float), legs).copy()
 
     extent = float(np.ptp(anchors, axis=0).max())
     if extent < _SMALLEST_MM:
         raise InputError(f"{path}: found anchors within {short(extent, 3)} of one another, expected millimetres")
-    if "mass" not in settings:
-        raise InputError(f"{path}: found no weight of the mover, expected M666 W or winch_mover_weight in kg")
+    mass = _mass(path, found)
     bounds = None
     if "least" in settings and "most" in settings:
         lowest = each("least", 0.0).max()
         highest = each("most", 0.0).min()
         bounds = float(lowest), float(highest)
     notes = ["Spools, motors and the spring constant of the line are left out."]
+    beyond, said = _beyond(each("beyond", 0.0), np.array(anchors), "beyond" in settings)
+    notes += said
     winch = None
     on_spools = _on_spools(path, found, each("on spool", 1.0))
     leg = np.repeat(np.arange(legs), on_spools)
@@ -186,7 +196,7 @@ def _of(path: Path, firmware: str, anchors: list[list[float]], found: _Settings)
         path.stem,
         f"Imported from {path.name} of {firmware}.",
         "position",
-        settings["mass"][0],
+        mass,
         origin,
         np.array(anchors)[leg] / 1000,
         zero,
@@ -197,10 +207,30 @@ def _of(path: Path, firmware: str, anchors: list[list[float]], found: _Settings)
         origin,
         tuple(notes),
         each("lines", 1.0)[leg],
-        each("beyond", 0.0)[leg] / 1000,
+        beyond[leg] / 1000,
         winch=winch,
         on_bed=True,
     )
+
+
+def _mass(path: Path, found: _Settings) -> float:
+    """Of the mover, kg."""
+    if "mass" not in found.values:
+        raise InputError(f"{path}: found no weight of the mover, expected M666 W or winch_mover_weight in kg")
+    mass = found.values["mass"][0]
+    if mass <= 0.0:  # by which the firmware knows that it is not to compensate for stretch
+        raise InputError(f"{path}, {found.where('mass')}: found {mass:g}, expected the weight of the mover in kg")
+    return mass
+
+
+def _beyond(given_mm: Floats, anchors_mm: Floats, is_stated: bool) -> tuple[Floats, list[str]]:
+    """(w,) wire between anchors (w, 3) and spools, mm, and what is to be said of it."""
+    if not is_stated:
+        return given_mm, ["The settings do not say how much wire lies between anchors and spools: none is assumed."]
+    if (given_mm >= 0.0).all():
+        return given_mm, []
+    to_last = np.linalg.norm(anchors_mm - anchors_mm[-1], axis=1)
+    return to_last, ["A negative length beyond the anchors is the firmware's word for spools at the last anchor."]
 
 
 def _on_spools(path: Path, found: _Settings, count: Floats) -> Indices:
@@ -208,5 +238,5 @@ def _on_spools(path: Path, found: _Settings, count: Floats) -> Indices:
     if not ((count >= 1) & (count <= _MOST_ON_SPOOL) & (count == np.round(count))).all():
         given = ":".join(f"{value:g}" for value in found.values["on spool"])
         expected = f"whole numbers from 1 to {_MOST_ON_SPOOL}, lines on each spool"
-        raise InputError(f"{path}, line {found.line['on spool']}, M666 O: found {given}, expected {expected}")
+        raise InputError(f"{path}, {found.where('on spool')}: found {given}, expected {expected}")
     return count.astype(int)

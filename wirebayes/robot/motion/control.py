@@ -16,6 +16,8 @@ from wirebayes.robot.motion.path import Slip
 
 Schedule = Callable[[float], Floats]
 _SLIP = 0.1  # of the tolerance: a jump no longer hardly uses it up
+# of the tolerance: less creep decides nothing, and where it makes slack wires begin to pull, steps would be tiny
+_UNSEEN = 0.1
 PROBABILITY = 0.95  # with which a pose is to be within tolerance
 
 
@@ -248,7 +250,8 @@ def lasting_within(
     """
     start = limits.position_m, limits.rotation
     slip = largest_slip(limits.distance_m, limits.angle_rad)
-    walk = CreepingHold(robot, wires, schedule, start, carried, needed=PROBABILITY, slip=slip)
+    least_mm = 1e3 * _UNSEEN * min(limits.distance_m, limits.angle_rad * robot.size_m)
+    walk = CreepingHold(robot, wires, schedule, start, carried, needed=PROBABILITY, slip=slip, least_mm=least_mm)
     longest = 0.0
     for k, time in enumerate(times_s):
         walk.to(float(time))

@@ -41,6 +41,8 @@ class CreepingHold:
         The hold is followed while at least this share of the draws have not fallen.
     slip : pair of floats, optional
         As in `path.follow`.
+    least_mm : float
+        Creep that is too little to matter: the errors of steps are measured against no less.
 
     Attributes
     ----------
@@ -63,6 +65,7 @@ class CreepingHold:
         error_m: Floats | float = 0.0,
         needed: float = 0.0,
         slip: path.Slip | None = None,
+        least_mm: float = 0.0,
     ) -> None:
         self.robot = robot
         self.wires = wires
@@ -71,6 +74,7 @@ class CreepingHold:
         self.error_m = error_m
         self.needed = needed
         self.slip = slip
+        self.least_mm = least_mm
         self.n = wires.count
         state = carried or fresh(robot.legs, self.n)
         self.lengths = self._lengths(0.0, state)
@@ -215,7 +219,7 @@ class CreepingHold:
 
     def _worst(self, off: Floats, last: HoldCreep, alive: Bools) -> float:
         """The error of a step, relative to what creeps in it: that of nearly all draws, a tenth of the largest."""
-        least = _RESOLVED * np.abs(self.creep.carried.creep_mm + self.creep.amount)
+        least = np.maximum(_RESOLVED * np.abs(self.creep.carried.creep_mm + self.creep.amount), self.least_mm)
         size = self._of_worst_wire(np.maximum(np.abs(last.grown), least))
         relative = self._of_worst_wire(off) / np.maximum(size, 1e-300)
         error = relative[alive]
