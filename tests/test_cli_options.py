@@ -15,7 +15,9 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import pytest
 
 from wirebayes.cli import COMMANDS, command_function
+from wirebayes.commands.load import _KINDS
 from wirebayes.commands.options import text_of
+from wirebayes.report.pages import PAGES
 
 # command -> module and name of its function
 FUNCTIONS = {
@@ -103,6 +105,15 @@ def renamed(name: str, parameter: str) -> str:
 
 def test_every_command_is_compared_with_its_function_or_known_to_differ() -> None:
     assert set(COMMANDS) == set(FUNCTIONS) | NOT_COMPARED, "a command needs a row in FUNCTIONS"
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_what_keeps_a_folder_can_be_loaded_and_has_a_page(name: str) -> None:
+    module, _, _ = FUNCTIONS[name].partition(".")
+    keeps_a_folder = hasattr(import_module(f"wirebayes.commands.{module}"), "open_run")
+    if keeps_a_folder and name != "fit":  # which `load` finds by itself
+        assert name in _KINDS, f"{name} needs a row in _KINDS of wirebayes/commands/load.py"
+    assert not keeps_a_folder or name in PAGES, f"{name} needs a row in PAGES of wirebayes/report/pages/__init__.py"
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

@@ -92,7 +92,8 @@ def test_a_public_function_is_documented_whole(name):
 @pytest.mark.parametrize("name", PUBLIC)
 def test_a_public_name_has_its_page_in_the_reference(name):
     reference = (DOCS / "reference.rst").read_text(encoding="utf-8")
-    assert re.search(rf"^   wirebayes\.{name}$", reference, re.MULTILINE)
+    there = re.search(rf"^   wirebayes\.{name}$", reference, re.MULTILINE)
+    assert there, f"{name} needs a line in docs/reference.rst"
 
 
 def test_an_example_that_is_wrong_is_found():

@@ -218,6 +218,8 @@ def bench_sets(e: Effect, rig: Rig) -> list[tuple[int, ...]]:
         return [tuple(range(len(rig.benches)))]
     if e.scope == "event":
         return [(b,) for b in range(len(rig.benches))]
+    if e.scope != "material":
+        raise ValueError(f"{e.name}: nothing says which benches share the amplitude of scope {e.scope!r}")
     sets = [tuple(i for i, b in enumerate(rig.benches) if b.material == m) for m in rig.materials]
     return [s for s in sets if len(s) > 1] if e.needs == "lengths" else sets
 

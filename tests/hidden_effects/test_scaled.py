@@ -13,7 +13,7 @@ from analyses.hidden_effects.scaled_draws import DELTAS, draw_case, draw_case_an
 from analyses.hidden_effects.scaled_law import Hidden, ScaledTest, readings
 from analyses.hidden_effects.scaled_lengths import DEPENDENT
 from analyses.hidden_effects.scaled_sizes import PLAIN
-from wirebayes.effects import effect_named
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.inference.fit import seed_of
 from wirebayes.wire.effect import Amplitude, Effect, Typical
 from wirebayes.wire.model import Model
@@ -226,6 +226,10 @@ def test_all_effects_are_compared():
     assert {key.split("@")[0] for key, _, _ in CASES + OF_STEPS} == set(KINDS)
     assert set(IN_NO_CATALOGUE) == set(FOREIGN)
     assert set(OF_LENGTHS) == {"fixture_compliance", "length_dependence"}
+
+
+def test_every_effect_of_the_catalogue_can_be_hidden_at_any_scale():
+    assert set(KINDS | OF_LENGTHS) == set(CATALOGUE), "an effect needs a row in KINDS of scaled_cases.py"
 
 
 @pytest.mark.parametrize("kind", ["foreign", "lengths"])
