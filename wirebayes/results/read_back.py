@@ -136,7 +136,23 @@ def _doubts(groups: Mapping[str, Group], name: str, summary: Path) -> tuple[Noti
             "can be wrong by more than is said; wirebayes discover looks for what is missing"
         )
         out.append(Notice("model-check", text))
-    return tuple(out)
+    return (*out, *_found_missing(name, summary.parent))
+
+
+def _found_missing(name: str, folder: Path) -> list[Notice]:
+    """What a search says against the plain model in a folder of its results."""
+    file = folder.parent.parent / "discovery.json"
+    if folder.name != "plain" or not file.is_file():
+        return []
+    report = read_json(file)["experiments"].get(name)
+    if report is None or report["verdict"] == "nothing-missing":
+        return []
+    sure = p_in_words(report["p_global"], report["p_simulations"])
+    text = (
+        f"the plain model of {name} lacks what discover found missing ({sure}): what follows from it can be wrong by "
+        "more than is said; the final model has it"
+    )
+    return [Notice("model-check", text)]
 
 
 def load_with_priors(folder: Path) -> list[tuple[Stored, dict[str, Array]]]:

@@ -1,0 +1,31 @@
+"""What a stored posterior has against it: what its fit said, and what a search found that it lacks."""
+
+import json
+
+import pytest
+
+from wirebayes.results.read_back import _found_missing
+
+
+@pytest.mark.parametrize(
+    ("verdict", "model", "name", "doubted"),
+    [
+        ("named", "plain", "wire", True),
+        ("unknown", "plain", "wire", True),
+        ("nothing-missing", "plain", "wire", False),
+        ("named", "final", "wire", False),
+        ("named", "plain", "another", False),
+    ],
+)
+def test_a_plain_model_is_doubted_where_a_search_found_something_missing(verdict, model, name, doubted, tmp_path):
+    report = {"verdict": verdict, "p_global": 0.003, "p_simulations": 999}
+    (tmp_path / "discovery.json").write_text(json.dumps({"experiments": {"wire": report}}))
+    folder = tmp_path / "wire" / model
+    folder.mkdir(parents=True)
+    found = _found_missing(name, folder)
+    assert [notice.kind for notice in found] == ["model-check"] * doubted
+    assert all("the plain model of wire lacks what discover found missing (p = 0.003)" in n.text for n in found)
+
+
+def test_a_fit_that_no_search_is_part_of_is_not_doubted(tmp_path):
+    assert _found_missing("wire", tmp_path / "wire" / "plain") == []
