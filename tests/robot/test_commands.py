@@ -347,8 +347,9 @@ def test_a_requested_pose_far_from_where_the_joint_values_lead_causes_a_warning(
     file, truth = session_csv
     arguments = ["calibrate", "linear-7", str(file), "--wires", str(fitted), "--draws", "20", "--output"]
     assert main([*arguments, str(tmp_path / "good")]) == 0
-    assert "warning" not in capsys.readouterr().err
-    assert read_json(tmp_path / "good" / "calibration.json")["warnings"] == []
+    capsys.readouterr()
+    kinds = {warning["kind"] for warning in read_json(tmp_path / "good" / "calibration.json")["warnings"]}
+    assert kinds == {"extrapolation"}  # the robot's wires are longer and pull harder than the one that was tested
     lines = [line.split(",") for line in file.read_text().splitlines()]
     for k, cells in enumerate(lines[1:]):
         cells[0] = str(10 * (k + 1))
@@ -357,7 +358,7 @@ def test_a_requested_pose_far_from_where_the_joint_values_lead_causes_a_warning(
     file.write_text("\n".join(",".join(cells) for cells in lines) + "\n")
     assert main([*arguments, str(tmp_path / "odd")]) == 0
     shown = capsys.readouterr().err.splitlines()
-    warned = [line for line in shown if "warning" in line]
+    warned = [line for line in shown if "requested pose" in line]
     assert [line.split(":")[1] for line in warned] == [" hold 20", " hold 40"]
     assert "the requested pose is 19.9 m and 0.0" in warned[0]
     assert " m and 2.5 rad from the one that its joint values lead to" in warned[1]

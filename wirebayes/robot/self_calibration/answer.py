@@ -23,7 +23,6 @@ from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.sag import sag_warnings_of_poses
 from wirebayes.robot.mechanics.winches import of_each_winch
-from wirebayes.robot.mechanics.wire_doubts import doubts
 from wirebayes.robot.motion import home, inverse, plausible
 from wirebayes.robot.self_calibration import sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
@@ -37,7 +36,7 @@ from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.residuals import contradicted, length_rms_m, lost, misfit, trust
 from wirebayes.robot.self_calibration.search import RATHER, Searched, StatedPoses, searched
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
-from wirebayes.robot.self_calibration.summary import Summary, summarised
+from wirebayes.robot.self_calibration.summary import Summary, summarised, wire_notices
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, chance, interval_about, unlearnt, unlikely
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
 from wirebayes.sentences import number, short
@@ -143,7 +142,7 @@ def calibration_report(
                 *tension_notices(robot, session, readings),
                 *([] if verdict.usable else _columns(search)),
                 *sensors.sensor_notices(search.at_fault),
-                *doubts(robot, prior.line),
+                *wire_notices(robot, prior.line, session.duration_s, s, verdict.usable),
             ]
         ),
     }

@@ -11,8 +11,12 @@ import numpy as np
 from scipy.special import ndtri, stdtrit
 
 from wirebayes.numeric.typing import Floats
+from wirebayes.result_warnings import Notice
 from wirebayes.robot.mechanics import rotation as turns
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.winches import of_each_leg
+from wirebayes.robot.mechanics.wire_doubts import doubts, wire_warnings
 from wirebayes.robot.self_calibration.posterior import RobotPosterior, at_joint_error
 
 _FACTOR = 1.05  # of the error of the joint values: a step for slopes of logarithms, which are smooth
@@ -71,6 +75,23 @@ def summarised(found: RobotPosterior) -> Summary:
     for name, mean in _means(found).items():
         moments[name] = Moment(mean, sds[name], halves[name])
     return Summary(**moments, strain=found.creep.strain[-1])
+
+
+def wire_notices(robot: Robot, line: WireDraws, durations_s: Floats, found: Summary, usable: bool) -> list[Notice]:
+    """What speaks against the fits of the wires, and where an answer that may be used leaves what was tested.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+    durations_s : (p,) array
+        How long each hold of the session took.
+    found : Summary
+    usable : bool
+    """
+    if not usable:
+        return doubts(robot, line)
+    return wire_warnings(robot, line, found.pull_N.mean, float(durations_s.max()), found.length_m.mean)
 
 
 def _means(found: RobotPosterior) -> dict[str, Floats]:
