@@ -53,22 +53,51 @@ class MarginalisedProblem(Problem):
     def log_likelihood(self, theta: Array, readings: Any = None) -> Array:
         """(n,) log-likelihood of the other parameters; -inf where the model cannot be computed."""
         with np.errstate(all="ignore"):
-            return self._log_likelihood(self._seen(self._lines(theta, readings)))
+            lines = self._lines(theta, readings)
+            seen = self._seen(lines)
+            if all(line.edges is None for line, _ in lines):
+                return self._log_likelihood(seen)
+            best = seen.amplitudes(seen.along)
+            return self._at_best(seen, best, super().log_likelihood(theta, self._without(lines, best)))
 
     def standardised(self, theta: Array, readings: Any = None) -> tuple[Array, Array]:
         """(n,) log-likelihood of the other parameters, and (m, n) residuals with the amplitudes at their best."""
-        residuals = []
         with np.errstate(all="ignore"):
             lines = self._lines(theta, readings)
             seen = self._seen(lines)
-            best = seen.amplitudes(seen.along).T
-            for shapes, (line, measured) in zip(self.shapes, lines, strict=True):
-                added = np.einsum("hrk,kn->hrn", shapes * self.sd, best)
-                without = replace(measured, readings=measured.readings - added)
-                _, left = likelihoods.standardised(line, without)
-                residuals.append(left)
-            residuals += [best, np.log(seen.diagonal.T)]
-            return self._log_likelihood(seen), np.concatenate(residuals)
+            best = seen.amplitudes(seen.along)
+            height, left = super().standardised(theta, self._without(lines, best))
+            residuals = np.concatenate([left, best.T, np.log(seen.diagonal.T)])
+            if all(line.edges is None for line, _ in lines):
+                return self._log_likelihood(seen), residuals
+            return self._at_best(seen, best, height), residuals
+
+    def _without(self, lines: Sequence["_Line"], best: Array) -> list[Array]:
+        """Per sample the readings (H, R, n) less what amplitudes (n, k) add, in standard deviations of their priors."""
+        out = []
+        for shapes, (_, measured) in zip(self.shapes, lines, strict=True):
+            added = np.einsum("hrk,nk->hrn", shapes * self.sd, best)
+            out.append(measured.readings - added)
+        return out
+
+    def _at_best(self, seen: "_Seen", best: Array, height: Array) -> Array:
+        """(n,) log-likelihood where setting errors may leave the wire slack.
+
+        Readings then are no linear function of the setting errors, and what is linear about those of no amplitudes may
+        be far off: so the density at the best amplitudes is evaluated itself (Laplace's approximation).
+
+        Parameters
+        ----------
+        seen : _Seen
+        best : (n, k) array
+            Amplitudes, in standard deviations of their priors.
+        height : (n,) array
+            Log-likelihood with these.
+        """
+        off = best - self.mean / self.sd
+        total = height - 0.5 * (off**2).sum(axis=1) - np.log(seen.diagonal).sum(axis=1)
+        precise = (seen.diagonal > 1.0 - _ROUNDING).all(axis=1)
+        return np.where(precise & np.isfinite(total), total, -np.inf)
 
     def _lines(self, theta: Array, readings: Any) -> list["_Line"]:
         return [self.linearised(theta, sample, y) for sample, y in self.observed(readings)]
