@@ -209,6 +209,7 @@ def test_a_function_writes_what_its_command_writes(folders, tmp_path, capsys):
     assert main(["export", "hangprinter-4", "--wires", str(fit), "--draws", "50", "--output", str(tmp_path / "a")]) == 0
     wb.export("hangprinter-4", wb.load(folders / "fit"), draws=50, output=tmp_path / "b")
     assert bytes_of(tmp_path / "a") == bytes_of(tmp_path / "b")
+    capsys.readouterr()
     columns = {"hold": [6, 6, 6, 7, 7], "displacement_mm": [6, 6, 6, 7, 7], "time_s": [0, 30, 60, 0, 200]}
     rows = zip(*columns.values(), strict=True)
     (tmp_path / "p.csv").write_text(",".join(columns) + "\n" + "".join(f"{a},{b},{c}\n" for a, b, c in rows))

@@ -56,11 +56,16 @@ def test_no_stream_that_is_closed_lends_its_number_to_a_file_of_results(tmp_path
         assert (tmp_path / "o" / path.name).read_bytes() == path.read_bytes()
 
 
-def test_letters_that_an_encoding_lacks(capfd):
+def test_letters_that_an_encoding_lacks(tmp_path, capfd):
     code, said, errors = in_shell(CHECK, "", **ASCII)
     assert (code, errors) == (0, "") and b"mm N\\u207b\\u1d41" in said
-    code, said, _ = in_shell([*CHECK, "--json"], "", **ASCII)
-    assert main([*CHECK, "--json"]) == 0
+    assert main(["init", str(tmp_path / "wire")]) == 0
+    capfd.readouterr()
+    (file,) = (tmp_path / "wire").glob("*.toml")
+    file.write_text(file.read_text(encoding="utf-8").replace("Dyneema", "Schnür"), encoding="utf-8")
+    as_json = ["check", str(file), "--json"]
+    code, said, _ = in_shell(as_json, "", **ASCII)
+    assert main(as_json) == 0
     as_utf_8 = capfd.readouterr().out
     assert code == 0 and said.isascii() and not as_utf_8.isascii()
     assert json.loads(said) == json.loads(as_utf_8)
