@@ -19,7 +19,6 @@ from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.mechanics.description import GivenWire
 from wirebayes.robot.mechanics.wires import tension
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration.summary import Moment, Summary, wire_notices
 
 BENT = [
     ("hooke", "strain_stiffening", {"strain_stiffening.c": 15.0}),
@@ -243,18 +242,6 @@ def test_a_creep_table_beyond_what_was_tested_is_said(loads_N, longest_s, said):
     tested = replace(_line("hooke", None, {}), tension_range_N=(1.0, 4.0), time_range_s=(0.0, 120.0))
     notices = export._of_table(robot, tested, np.array(loads_N), np.array([60.0, longest_s]))
     assert [(notice.kind, notice.text) for notice in notices] == [("extrapolation", text) for text in said]
-
-
-@pytest.mark.parametrize(
-    ("usable", "longest_s", "said"), [(True, 120.0, []), (True, 600.0, ["extrapolation"]), (False, 600.0, [])]
-)
-def test_a_calibration_that_may_be_used_says_where_it_leaves_what_was_tested(usable, longest_s, said):
-    robot = schema.read_robot_file("hangprinter-4")
-    tested = replace(_line("hooke", None, {}), tension_range_N=(1.0, 4.0), time_range_s=(0.0, 120.0))
-    ones = Moment(np.ones(4), np.ones(4), np.ones(4))
-    found = Summary(*(ones for _ in range(9)), strain=np.zeros(4))
-    notices = wire_notices(robot, tested, np.array([60.0, longest_s]), found, usable)
-    assert [notice.kind for notice in notices] == said
 
 
 def test_what_is_known_of_a_fit_is_not_said_of_a_given_wire():

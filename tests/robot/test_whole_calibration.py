@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm, t
 
+from tests.robot.lines import CORE, line_about
 from tests.robot.test_commands import fitted, session_csv  # noqa: F401
 from wirebayes.cli import main
 from wirebayes.io.run_folder import read_json
@@ -188,3 +189,15 @@ def test_poses_that_are_kept_say_how_much_nearer_the_joint_values_are_without_th
     assert answer.closer == pytest.approx(3.5)
     undoubted = search._rather_requests(given, holds, False, False, silent)
     assert undoubted.closer == 1.0
+
+
+@pytest.mark.parametrize(
+    ("usable", "longest_s", "said"), [(True, 120.0, []), (True, 600.0, ["extrapolation"]), (False, 600.0, [])]
+)
+def test_a_calibration_that_may_be_used_says_where_it_leaves_what_was_tested(usable, longest_s, said):
+    robot = schema.read_robot_file("hangprinter-4")
+    tested = replace(line_about(CORE, 0.05, 40), tension_range_N=(1.0, 4.0), time_range_s=(0.0, 120.0))
+    ones = summary.Moment(np.ones(4), np.ones(4), np.ones(4))
+    found = summary.Summary(*(ones for _ in range(9)), strain=np.zeros(4))
+    notices = summary.wire_notices(robot, tested, np.array([60.0, longest_s]), found, usable)
+    assert [notice.kind for notice in notices] == said

@@ -25,9 +25,8 @@ _MOST_CURVED = 3.5
 # added to the curvature (of order one under the prior alone), tried in one batch where a step gains too little
 _DAMPINGS = np.array([1.0, 10.0, 100.0, 1e3, 1e4, 1e6])
 _PATIENCE = 10.0  # times the promised gain of a step: along a bent ridge there are many such steps
-_SLOW = 15  # steps, after which what is left seldom ends by the expected information: that bends more than the density
-# points of one Newton step by differences: so many cost hardly more than their fewest, which other steps take
-_MOST_POINTS = 2000
+_SLOW = 15  # steps: a row that still climbs then creeps along a ridge, where the density is less curved than expected
+_MOST_POINTS = 2000  # of one step by differences: a batch of so many takes hardly longer than a small one
 _RELAX, _LEAST_DAMPING = 0.2, 0.3  # share of the damping kept after a step that was good; less than the latter is none
 
 
@@ -99,7 +98,7 @@ class _Climbs:
         return np.isfinite(ahead) & (ahead > least)
 
     def go_on(self, density: Density, rows: Ints, local: _Local, tolerance: float) -> Ints:
-        """Rows take the steps to where they looked, where these are good; the numbers of those that took them."""
+        """Let rows take the steps to where they looked, or lead them back, and return those that took theirs."""
         good = self.gain_enough(rows, local.value)
         if good.all():
             self.take_step(rows, local, tolerance)
@@ -220,7 +219,7 @@ def climb(
         rows = np.flatnonzero(~climbs.done)
         if not len(rows):
             break
-        if not len(last) and _are_the_last(step, *climbs.z[rows].shape):
+        if not len(last) and _are_the_last(step, len(rows), start.shape[1]):
             last = rows
             look = partial(_by_differences, density)
         local = look(climbs.ahead[rows], rows, climbs.curvature[rows])

@@ -55,10 +55,13 @@ class MarginalisedProblem(Problem):
         with np.errstate(all="ignore"):
             lines = self._lines(theta, readings)
             seen = self._seen(lines)
-            if all(line.edges is None for line, _ in lines):
+            if _are_linear(lines):
                 return self._log_likelihood(seen)
             best = seen.amplitudes(seen.along)
-            return self._at_best(seen, best, super().log_likelihood(theta, self._without(lines, best)))
+            height: Any = 0.0
+            for line, without in self._without(theta, lines, best):
+                height = height + likelihoods.chain(line, without).log_likelihood.sum(axis=0)
+            return self._at_best(seen, best, height)
 
     def standardised(self, theta: Array, readings: Any = None) -> tuple[Array, Array]:
         """(n,) log-likelihood of the other parameters, and (m, n) residuals with the amplitudes at their best."""
@@ -66,18 +69,28 @@ class MarginalisedProblem(Problem):
             lines = self._lines(theta, readings)
             seen = self._seen(lines)
             best = seen.amplitudes(seen.along)
-            height, left = super().standardised(theta, self._without(lines, best))
-            residuals = np.concatenate([left, best.T, np.log(seen.diagonal.T)])
-            if all(line.edges is None for line, _ in lines):
-                return self._log_likelihood(seen), residuals
-            return self._at_best(seen, best, height), residuals
+            height: Any = 0.0
+            residuals = []
+            for line, without in self._without(theta, lines, best):
+                value, left = likelihoods.standardised(line, without)
+                height = height + value
+                residuals.append(left)
+            residuals += [best.T, np.log(seen.diagonal.T)]
+            total = self._log_likelihood(seen) if _are_linear(lines) else self._at_best(seen, best, height)
+            return total, np.concatenate(residuals)
 
-    def _without(self, lines: Sequence["_Line"], best: Array) -> list[Array]:
-        """Per sample the readings (H, R, n) less what amplitudes (n, k) add, in standard deviations of their priors."""
+    def _without(self, theta: Array, lines: Sequence["_Line"], best: Array) -> list["_Line"]:
+        """The samples with readings less what amplitudes (n, k) add, in standard deviations of their priors.
+
+        Holds that may be slack are expanded about what is read of them, so their samples are linearised anew.
+        """
         out = []
-        for shapes, (_, measured) in zip(self.shapes, lines, strict=True):
+        for sample, shapes, (line, measured) in zip(self.samples, self.shapes, lines, strict=True):
             added = np.einsum("hrk,nk->hrn", shapes * self.sd, best)
-            out.append(measured.readings - added)
+            without = replace(measured, readings=measured.readings - added)
+            if line.edges is not None:
+                line, without = self.linearised(theta, sample, without.readings)
+            out.append((line, without))
         return out
 
     def _at_best(self, seen: "_Seen", best: Array, height: Array) -> Array:
@@ -96,8 +109,7 @@ class MarginalisedProblem(Problem):
         """
         off = best - self.mean / self.sd
         total = height - 0.5 * (off**2).sum(axis=1) - np.log(seen.diagonal).sum(axis=1)
-        precise = (seen.diagonal > 1.0 - _ROUNDING).all(axis=1)
-        return np.where(precise & np.isfinite(total), total, -np.inf)
+        return np.where(seen.is_precise & np.isfinite(total), total, -np.inf)
 
     def _lines(self, theta: Array, readings: Any) -> list["_Line"]:
         return [self.linearised(theta, sample, y) for sample, y in self.observed(readings)]
@@ -105,8 +117,7 @@ class MarginalisedProblem(Problem):
     def _log_likelihood(self, seen: "_Seen") -> Array:
         explained = (seen.along**2).sum(axis=1)
         # At absurd parameters rounding may make more of the readings than there is to explain.
-        precise = (seen.diagonal > 1.0 - _ROUNDING).all(axis=1)
-        regular = precise & (explained <= (1.0 + _ROUNDING) * seen.square)
+        regular = seen.is_precise & (explained <= (1.0 + _ROUNDING) * seen.square)
         by_prior = ((self.mean / self.sd) ** 2).sum()
         total = seen.total + 0.5 * (explained - by_prior) - np.log(seen.diagonal).sum(axis=1)
         return np.where(regular & np.isfinite(total), total, -np.inf)
@@ -191,10 +202,20 @@ class _Seen:
         """(n, k) of the factor."""
         return np.einsum("nii->ni", self.factor)
 
+    @property
+    def is_precise(self) -> Array:
+        """(n,) whether rounding has left the precision no less than one."""
+        return np.asarray((self.diagonal > 1.0 - _ROUNDING).all(axis=1))
+
     def amplitudes(self, along: Array) -> Array:
         """(n, k) those whose product with the factor's transpose is `along` (n, k)."""
         inverse = np.swapaxes(linear_algebra.inv(self.factor), 1, 2)
         return (inverse @ along[..., None])[..., 0]
+
+
+def _are_linear(lines: Sequence[_Line]) -> bool:
+    """Whether no setting error can leave the wire slack: the readings are then linear in these errors, too."""
+    return all(line.edges is None for line, _ in lines)
 
 
 def integrated(problem: Problem) -> Problem:
