@@ -16,6 +16,7 @@ from wirebayes.io.run_folder import open_run, write_csv, write_json
 from wirebayes.processes.workers import computing
 from wirebayes.progress import Progress
 from wirebayes.robot.history import table
+from wirebayes.robot.history.another_unit import refuse_another_unit
 from wirebayes.robot.history.answer import history_report
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.unknowns import Uncertain
@@ -157,6 +158,8 @@ def pose_over_time(asked: AskedPose, option: str, given: Any, errors: Uncertain,
     _refuse_two_payloads(asked, option, history)
     _refuse_off_plane(robot, option, history)
     refuse_boundless_creep(robot, asked.line, *asked.start, history.times_s[-1] - history.times_s[0])
+    with np.errstate(all="ignore"):
+        refuse_another_unit(robot, asked.line, history, asked.start, errors)
     lasting = {  # in a fixed order, as in `wires.configuration`
         "of": name,
         "content": read,

@@ -157,8 +157,18 @@ def find_mode(known: LogUnknowns, read: LogReadings, way: Way, without: Bools) -
         best = Mode(z, slope, found, near)
         if near:
             break
-        z = z + move[0]
+        z = z + _within_reach(known, z, move[0])
     return best
+
+
+def _within_reach(known: LogUnknowns, white: Floats, move: Floats) -> Floats:
+    """A move ``(d + m,)``, shortened to end where its wires are still some that there may be."""
+    d = known.count
+    here = known.root @ white[:d]
+    onward = known.root @ move[:d]
+    room = known.reach - np.sign(onward) * here
+    share = room / np.maximum(np.abs(onward), 1e-300)
+    return move * float(np.clip(share.min(initial=1.0), 0.0, 1.0))
 
 
 def draw_posterior(known: Callable[[], LogUnknowns], read: LogReadings, mode: Mode, way: Way, rng: Generator) -> Draws:

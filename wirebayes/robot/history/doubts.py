@@ -116,7 +116,10 @@ def _contradicted(history: History, found: Estimate, draws_used: int) -> list[No
     """Notices that the readings do not agree with the joint values, or that few draws agree with both."""
     out = []
     if history.read and not found.converged:
-        text = "the readings could not be brought together with the joint values: no mode was reached"
+        text = (
+            "the readings could not be brought together with the joint values, whatever the wires: check units and "
+            "signs of all columns, the payload, and --reference-sd; the bands are those without the readings"
+        )
         out.append(Notice("not-converged", text))
     elif found.misfit is not None and found.misfit > _MISFIT:
         text = (
@@ -124,7 +127,7 @@ def _contradicted(history: History, found: Estimate, draws_used: int) -> list[No
             "expected about 1; check signs, units, payload and the standard errors"
         )
         out.append(Notice("misfit", text))
-    if found.effective is not None and found.effective < _FEWEST:
+    if found.converged and found.effective is not None and found.effective < _FEWEST:
         then = "the bands' ends are rough" if found.used else "the readings are not used, the bands are those without"
         text = (
             f"only about {found.effective:.0f} of {draws_used} draws agree with the readings: {then}; take more "

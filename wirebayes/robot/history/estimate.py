@@ -93,10 +93,10 @@ def estimate_poses(
         return way.followed(known.draws)
     read = LogReadings(log_readings(history, robot.legs), weights(history.times_s), sensors(robot, errors))
     mode = _mode(known, read, way)
-    if mode is None:  # not even the mean wires hang in balance
+    if mode is None or not mode.converged:  # not even the mean wires hang in balance, or no wires explain the readings
         return replace(way.followed(known.draws), converged=False, effective=0.0, used=False)
     out = draw_posterior(lambda: unknowns(robot, line, errors, rng), read, mode, way.white, rng)
-    return replace(_used(way, out, line.count), misfit=_misfit(read, out), converged=mode.converged)
+    return replace(_used(way, out, line.count), misfit=_misfit(read, out))
 
 
 def _used(way: "_Way", out: Draws, count: int) -> Estimate:

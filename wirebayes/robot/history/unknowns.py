@@ -10,13 +10,14 @@ from scipy.special import ndtri
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.follow import uncreeping
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.draws import CORE, WireDraws
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion.creep import CreepState, fresh
 from wirebayes.robot.self_calibration.calibrated import Calibrated
 from wirebayes.robot.self_calibration.session import LengthPrior
 
 _STEP = 0.05  # of a prior sd: far above the solver's error, and poses are straight over it
+_FAR, _TIMES = 5.0, np.log(2.0)  # standard deviations of what is known of wires, and a factor of two in any case
 _EXACT_M = 1e-6  # a length that is said to be exact is known to a micrometre
 
 
@@ -59,6 +60,8 @@ class LogUnknowns:
     draws : (n, d) array
         White draws of the prior, the line's as the posterior of its fit has them.
     calibrated : Calibrated or None
+    reach : (d,) array or float
+        How far from the mean a search may go.
     """
 
     robot: Robot
@@ -67,6 +70,7 @@ class LogUnknowns:
     root: Floats
     draws: Floats
     calibrated: Calibrated | None = None
+    reach: Floats | float = np.inf
 
     @property
     def count(self) -> int:
@@ -112,13 +116,29 @@ def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: Generator) -
     known = errors.calibrated
     if known is not None:
         draws = even_normals(line.count, len(known.mean), rng)
-        return LogUnknowns(robot, known.prior, known.mean, _root(known.covariance), draws, known)
+        root = _root(known.covariance)
+        return LogUnknowns(robot, known.prior, known.mean, root, draws, known, _reach(known.prior, robot.legs, root))
     prior = LengthPrior(line, max(errors.reference_m, _EXACT_M), errors.spread)
     mean, covariance = prior.moments(robot.legs)
     root = np.asarray(np.linalg.cholesky(covariance), np.float64)
     off = _drawn(prior, robot.legs, rng) - mean
     white = solve_triangular(root, off.T, lower=True).T
-    return LogUnknowns(robot, prior, mean, root, white)
+    return LogUnknowns(robot, prior, mean, root, white, reach=_reach(prior, robot.legs, root))
+
+
+def _reach(prior: LengthPrior, legs: int, root: Floats) -> Floats:
+    """How far ``(d,)`` from the mean a search may go: for lengths and sensors as far as it likes.
+
+    Readings that lead further for their wires are explained by none. A search followed them for minutes, through creep
+    by the tenth power of the tension, until a time was too short to be divided by.
+    """
+    own = len(prior.own) * legs
+    wires = slice(legs, legs + len(prior.names) + own)
+    is_logarithm = [name.split()[-1] in CORE for name in prior.names] + [True] * own
+    far = _FAR * np.linalg.norm(root[wires], axis=1)
+    out = np.full(len(root), np.inf)
+    out[wires] = np.where(is_logarithm, np.maximum(far, _TIMES), far)
+    return out
 
 
 def _drawn(prior: LengthPrior, legs: int, rng: Generator) -> Floats:

@@ -140,16 +140,57 @@ def _tension_mistake(
 
     The columns, what was found and what was expected.
     """
-    balance = _Balance.at(robot, position_m, rotation, tension_N)
-    names = [f"tension_{i}_N" for i in range(1, robot.legs + 1)]
-    pull = balance.pull(range(robot.legs))
-    times = balance.times(pull)
-    if not 1 / _ANOTHER_UNIT < times < _ANOTHER_UNIT and balance.left(times * pull) < _EVEN:
-        found = f"tensions that are, all together, {number(1 / times)} times what carries the platform's weight"
-        return f"{names[0]} to {names[-1]}", found, "newtons (or another mass_kg)"
-    if balance.left(pull) < _EVEN:
+    balance = _Balance.at(robot, position_m, rotation, tension_N, _weight(robot, rotation))
+    names = _tension_columns(robot)
+    other = _of_another_unit(balance, names)
+    if other is not None:
+        return other
+    if balance.left(balance.pull(range(robot.legs))) < _EVEN:
         return None
     return _mixed_up(balance, names)
+
+
+def unit_mistake(robots: Sequence[Robot], position_m: Floats, rotation: Floats, tension_N: Floats) -> str | None:
+    """What was found and expected of tensions that would carry the platform in another unit only; None where they do.
+
+    Parameters
+    ----------
+    robots : (p,) sequence of Robot
+        With what the platform carries at each pose.
+    position_m : (p, 3) array
+    rotation : (p, 3, 3) array
+    tension_N : (p, w) array
+        Of all wires.
+    """
+    if len(tension_N) < _FEWEST or robots[0].winch is not None:
+        return None
+    robot = robots[0]
+    each = [_weight(loaded, turn[None]) for loaded, turn in zip(robots, rotation, strict=True)]
+    balance = _Balance.at(robot, position_m, rotation, tension_N, np.concatenate(each, axis=1))
+    mistake = _of_another_unit(balance, _tension_columns(robot))
+    if mistake is None:
+        return None
+    columns, found, expected = mistake
+    return f"{columns}: found {found}, expected {expected}"
+
+
+def _tension_columns(robot: Robot) -> list[str]:
+    return [f"tension_{i}_N" for i in range(1, robot.legs + 1)]
+
+
+def _weight(robot: Robot, rotation: Floats) -> Floats:
+    """What the wires shall carry, ``(d, p)``, at rotations ``(p, 3, 3)``."""
+    return -statics.weight(robot, batch_last(rotation))
+
+
+def _of_another_unit(balance: "_Balance", names: Sequence[str]) -> tuple[str, str, str] | None:
+    """All columns of tensions, if they carry the weight in another unit only."""
+    pull = balance.pull(range(len(names)))
+    times = balance.times(pull)
+    if 1 / _ANOTHER_UNIT < times < _ANOTHER_UNIT or balance.left(times * pull) >= _EVEN:
+        return None
+    found = f"tensions that are, all together, {number(1 / times)} times what carries the platform's weight"
+    return f"{names[0]} to {names[-1]}", found, "newtons (or another mass_kg)"
 
 
 def _mixed_up(balance: "_Balance", names: Sequence[str]) -> tuple[str, str, str] | None:
@@ -184,10 +225,8 @@ class _Balance:
     tension_N: Floats
 
     @classmethod
-    def at(cls, robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> "_Balance":
-        turn = batch_last(rotation)
-        shape = statics.geometry(robot, position_m.T, turn)
-        load = -statics.weight(robot, turn)
+    def at(cls, robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats, load: Floats) -> "_Balance":
+        shape = statics.geometry(robot, position_m.T, batch_last(rotation))
         scale = np.where(np.arange(len(load)) < 3, 1.0, 1.0 / robot.size_m)[:, None]
         return cls(-statics.wire_jacobian(robot, shape), scale, scale * load, tension_N)
 
