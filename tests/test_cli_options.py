@@ -15,6 +15,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import pytest
 
 from wirebayes.cli import COMMANDS, command_function
+from wirebayes.cli.options import as_typed, folder_for
 from wirebayes.commands.load import _KINDS
 from wirebayes.commands.options import text_of
 from wirebayes.report.pages import PAGES
@@ -166,3 +167,35 @@ def test_defaults_that_differ_are_seen() -> None:
     assert alike(None, ()) and alike("", ()) and alike("1,2", (1, 2)) and alike(0.05, 0.05)
     assert not alike(0.05, 0.1) and not alike(0, None) and not alike(0.0, ()) and not alike("1,2", (1, 3))
     assert choices(Literal["a", "b"] | None) == ("a", "b") and choices(str | None) == ()
+
+
+@pytest.mark.parametrize(
+    ("experiment", "output", "folder"),
+    [
+        (None, None, "lines-fit"),
+        ("kite", None, "lines-kite-fit"),
+        ("lines", None, "lines-fit"),
+        ("kite", Path("out"), "out"),
+    ],
+)
+def test_results_of_one_experiment_have_a_folder_of_their_own(
+    experiment: str | None, output: Path | None, folder: str
+) -> None:
+    assert folder_for("fit", Path("data/lines.toml"), output, experiment) == Path(folder)
+
+
+@pytest.mark.parametrize(
+    ("options", "typed"),
+    [
+        ({}, "'my lines.toml'"),
+        (
+            {"elastic_law": "hooke", "history": "saturating", "experiment": None, "drop_breaks": False},
+            "'my lines.toml'",
+        ),
+        ({"experiment": "kite 1", "train_holds": 1}, "'my lines.toml' --experiment 'kite 1' --train-holds 1"),
+        ({"history": "additive", "drop_breaks": True}, "'my lines.toml' --history additive --drop-breaks"),
+        ({"own_effects": Path("my effects.py")}, "'my lines.toml' --own-effects 'my effects.py'"),
+    ],
+)
+def test_the_next_command_keeps_the_options_that_were_given(options: dict[str, Any], typed: str) -> None:
+    assert as_typed(Path("my lines.toml"), **options) == typed

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from wirebayes.cli.options import AsJson, DropBreaks, ExperimentFile, ExperimentName, OwnEffects, Quiet, Seed
+from wirebayes.cli.options import AsJson, DropBreaks, ExperimentFile, ExperimentName, OwnEffects, Quiet, Seed, as_typed
 
 
 def check_command(
@@ -28,7 +28,7 @@ def check_command(
     from wirebayes.cli.answer import print_answer
     from wirebayes.cli.progress import progress
     from wirebayes.commands.check import check as run
-    from wirebayes.views.result import Given, typed
+    from wirebayes.views.result import Given
 
     with progress() as report:
         checked = run(
@@ -40,4 +40,5 @@ def check_command(
             output=output,
             progress=report,
         )
-    print_answer(checked, Given(typed(file)), as_json=as_json, quiet=quiet, kept=output is not None)
+    given = as_typed(file, experiment=experiment, own_effects=own_effects, drop_breaks=drop_breaks)
+    print_answer(checked, Given(given), as_json=as_json, quiet=quiet, kept=output is not None)

@@ -17,6 +17,7 @@ from wirebayes.cli.options import (
     Quiet,
     Seed,
     TrainHolds,
+    as_typed,
     folder_for,
 )
 
@@ -49,7 +50,7 @@ def compare_command(
     from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
     from wirebayes.commands.compare import carry_out, plan_comparison
-    from wirebayes.views.result import Given, typed
+    from wirebayes.views.result import Given
 
     planned = plan_comparison(
         file,
@@ -66,5 +67,6 @@ def compare_command(
     for line in for_terminal(said, sys.stderr):  # before the work, which takes minutes
         typer.echo(line, err=True)
     with progress() as report:
-        found = carry_out(planned, folder_for("compare", file, output), report)
-    conclude(found, Given(typed(file)), as_json=as_json, quiet=quiet, said=said)
+        found = carry_out(planned, folder_for("compare", file, output, experiment), report)
+    given = as_typed(file, experiment=experiment, own_effects=own_effects)
+    conclude(found, Given(given), as_json=as_json, quiet=quiet, said=said)

@@ -48,7 +48,7 @@ def discover_command(
             own_effects=own_effects,
             drop_breaks=drop_breaks,
             seed=seed,
-            output=folder_for("discover", file, output),
+            output=folder_for("discover", file, output, experiment),
             progress=report,
         )
     conclude(findings, Given(typed(file)), as_json=as_json, quiet=quiet)

@@ -17,6 +17,7 @@ from wirebayes.cli.options import (
     Quiet,
     Seed,
     TrainHolds,
+    as_typed,
     folder_for,
 )
 
@@ -52,7 +53,7 @@ def fit_command(
     from wirebayes.cli.answer import conclude, page_writer
     from wirebayes.cli.progress import progress
     from wirebayes.commands.fit import fit as run
-    from wirebayes.views.result import Given, typed
+    from wirebayes.views.result import Given
 
     with page_writer() as write_page:
         with progress() as report:
@@ -69,7 +70,16 @@ def fit_command(
                 together=together,
                 check=check,
                 seed=seed,
-                output=folder_for("fit", file, output),
+                output=folder_for("fit", file, output, experiment),
                 progress=report,
             )
-        conclude(fitted, Given(typed(file)), write_page, as_json=as_json, quiet=quiet)
+        given = as_typed(
+            file,
+            experiment=experiment,
+            train_holds=train_holds,
+            elastic_law=elastic_law,
+            history=history,
+            own_effects=own_effects,
+            drop_breaks=drop_breaks,
+        )
+        conclude(fitted, Given(given), write_page, as_json=as_json, quiet=quiet)

@@ -66,9 +66,10 @@ Scheduler = Annotated[
     str | None,
     typer.Option("--scheduler", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler."),
 ]
+_USUAL = {"elastic_law": "hooke", "history": "saturating"}  # of options that every fit has
 
 
-def folder_for(command: str, file: Path | str, output: Path | None) -> Path:
+def folder_for(command: str, file: Path | str, output: Path | None, experiment: str | None = None) -> Path:
     """The folder of a command's results: as asked for, or named after what it reads and what it does.
 
     Parameters
@@ -77,5 +78,33 @@ def folder_for(command: str, file: Path | str, output: Path | None) -> Path:
     file : Path or str
         The experiment file, or the robot.
     output : Path or None
+    experiment : str, optional
+        The only one of the file's experiments that is read.
     """
-    return Path(f"{Path(file).stem}-{command}") if output is None else output
+    if output is not None:
+        return output
+    stem = Path(file).stem
+    read = stem if experiment in (None, stem) else f"{stem}-{experiment}"
+    return Path(f"{read}-{command}")
+
+
+def as_typed(file: Path, **options: str | int | Path | None) -> str:
+    """An experiment file as it is typed for the next command, with the options that are to stay.
+
+    Parameters
+    ----------
+    file : Path
+    options : of str, int, Path, bool or None
+        By their names in Python. Those that were not given, or have the value that they have when left out, are not
+        typed.
+    """
+    from wirebayes.views.result import typed
+
+    words = [typed(file)]
+    for name, value in options.items():
+        flag = f"--{name.replace('_', '-')}"
+        if value is True:
+            words.append(flag)
+        elif value not in (None, False, _USUAL.get(name)):
+            words.append(f"{flag} {typed(str(value))}")
+    return " ".join(words)
