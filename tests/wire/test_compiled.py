@@ -27,8 +27,8 @@ from wirebayes.wire.effect import Effect, EventEffect, Typical
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import Linearised, linearise, simulate, streamed
 
-if compiled.kernel is None:
-    pytest.skip("the package was installed without a C compiler", allow_module_level=True)
+NEEDS_KERNEL = pytest.mark.skipif(compiled.kernel is None, reason="the package was installed without a C compiler")
+pytestmark = NEEDS_KERNEL
 
 TIMES = [0.0, 30.0, 60.0, 90.0, 120.0]
 ONE_WAY = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.special import lambertw
 
 from tests.wire.protocols import PLAIN, columns, parameters, protocol, protocols, weights_by_hand
-from tests.wire.test_compiled import FORMS, LAWS_OF_CREEP, by_numpy, drawn, models, same
+from tests.wire.test_compiled import FORMS, LAWS_OF_CREEP, NEEDS_KERNEL, by_numpy, drawn, models, same
 from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.wire import compiled
 from wirebayes.wire.inverse import inverse
@@ -33,6 +33,7 @@ def test_weights_are_the_law_solved_for_the_length(p, theta, law, history):
             assert row[mask] == pytest.approx(wanted, rel=1e-9, abs=1e-9)
 
 
+@NEEDS_KERNEL
 @settings(deadline=None)
 @given(
     protocols(control="force"),
