@@ -30,6 +30,11 @@ KINDS = {
         "them can be wrong by more than they say.",
         True,
     ),
+    "incomplete": Kind(
+        "Something is probably missing in the model that the readings do not establish: its intervals and predictions "
+        "do without it, and can be wrong by more than they say.",
+        True,
+    ),
     "not-converged": Kind("A sampler or a search did not converge: its numbers are not to be used.", True),
     "misfit": Kind("Readings deviate from the model that should explain them by more than their stated errors.", True),
     "failed": Kind("Something could not be computed at all, for the reason given.", True),

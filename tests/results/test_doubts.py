@@ -18,13 +18,26 @@ from wirebayes.results.read_back import _found_missing
     ],
 )
 def test_a_plain_model_is_doubted_where_a_search_found_something_missing(verdict, model, name, doubted, tmp_path):
-    report = {"verdict": verdict, "p_global": 0.003, "p_simulations": 999}
+    report = {"verdict": verdict, "p_global": 0.003, "p_simulations": 999, "warnings": []}
     (tmp_path / "discovery.json").write_text(json.dumps({"experiments": {"wire": report}}))
     folder = tmp_path / "wire" / model
     folder.mkdir(parents=True)
     found = _found_missing(name, folder)
     assert [notice.kind for notice in found] == ["model-check"] * doubted
     assert all("the plain model of wire lacks what discover found missing (p = 0.003)" in n.text for n in found)
+
+
+@pytest.mark.parametrize(
+    ("model", "verdict", "kinds"), [("final", "named", ["incomplete"]), ("plain", "named", ["model-check"])]
+)
+def test_a_final_model_is_doubted_where_something_more_is_likely(model, verdict, kinds, tmp_path):
+    likely = {"kind": "incomplete", "text": "likely missing too: the readings drift"}
+    warnings = [likely, {"kind": "data", "text": "of the readings"}]
+    report = {"verdict": verdict, "p_global": 0.003, "p_simulations": 999, "warnings": warnings}
+    (tmp_path / "discovery.json").write_text(json.dumps({"experiments": {"wire": report}}))
+    folder = tmp_path / "wire" / model
+    folder.mkdir(parents=True)
+    assert [notice.kind for notice in _found_missing("wire", folder)] == kinds
 
 
 def test_a_fit_that_no_search_is_part_of_is_not_doubted(tmp_path):

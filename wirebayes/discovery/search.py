@@ -20,6 +20,7 @@ from wirebayes.discovery.global_test import Gate, examine
 from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.investigation import Concluded, Investigation
 from wirebayes.discovery.judgement import Evidence, FamilyEvidence
+from wirebayes.discovery.likely_beside import likely_beside
 from wirebayes.discovery.material_answer import MaterialAnswer, answer_material
 from wirebayes.discovery.model_space import largest_first
 from wirebayes.discovery.naming import Named, name_effects
@@ -45,7 +46,7 @@ from wirebayes.json_files.read_units import in_unit
 from wirebayes.model.scales import scales_of
 from wirebayes.processes.workers import ParallelMap
 from wirebayes.progress import Progress, silent
-from wirebayes.result_warnings import Notice, notices_by_part, to_json
+from wirebayes.result_warnings import Notice, from_json, notices_by_part, to_json
 from wirebayes.results.posterior_checks import copied_samples
 from wirebayes.sentences import counted
 from wirebayes.wire.control import READ_UNIT
@@ -120,7 +121,9 @@ def investigate(
         own = _own_reports(gate, i, answer, left_out, rng, parallel_map)
         for e in gate.blocks[i].experiments:
             common = _common(answers, i, e, gate.blocks, gate.test, where[i], alike)
-            out[e.name] = {**common, **ahead, **own[e.name]}
+            beside = likely_beside(common)
+            warnings = to_json([*beside, *from_json(own[e.name]["warnings"])])
+            out[e.name] = {**common, **ahead, **own[e.name], "warnings": warnings}
     report("held-out holds", len(answers), len(answers))
     return Investigation(
         models.final,

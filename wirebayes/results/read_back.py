@@ -21,7 +21,7 @@ from wirebayes.model.prior import Prior
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import LENGTH_EXPONENT, Sample, at_length
 from wirebayes.numeric.typing import Array
-from wirebayes.result_warnings import Notice
+from wirebayes.result_warnings import Notice, from_json
 from wirebayes.results import netcdf
 from wirebayes.results.content import READING, SETTING
 from wirebayes.results.netcdf import Group
@@ -140,13 +140,15 @@ def _doubts(groups: Mapping[str, Group], name: str, summary: Path) -> tuple[Noti
 
 
 def _found_missing(name: str, folder: Path) -> list[Notice]:
-    """What a search says against the plain model in a folder of its results."""
+    """What a search says against the plain or the final model in a folder of its results."""
     file = folder.parent.parent / "discovery.json"
-    if folder.name != "plain" or not file.is_file():
+    if folder.name not in ("plain", "final") or not file.is_file():
         return []
     report = read_json(file)["experiments"].get(name)
     if report is None or report["verdict"] == "nothing-missing":
         return []
+    if folder.name == "final":
+        return [notice.of(name) for notice in from_json(report["warnings"]) if notice.kind == "incomplete"]
     sure = p_in_words(report["p_global"], report["p_simulations"])
     text = (
         f"the plain model of {name} lacks what discover found missing ({sure}): what follows from it can be wrong by "

@@ -1,0 +1,42 @@
+"""What is more likely missing than not beside what was named is said, and only where the final model lacks it."""
+
+import pytest
+
+from wirebayes.discovery.likely_beside import likely_beside
+from wirebayes.discovery.settings import REMAINS
+
+ABOVE, BELOW = REMAINS + 0.01, REMAINS - 0.01
+
+
+def _found(drift=BELOW, established=False, remains=BELOW, **changes):
+    toe = {"members": ["toe"], "inclusion": 0.95, "established": True, "sentence": "there is toe, 95 %"}
+    slow = {"members": ["sensor_drift"], "inclusion": drift, "established": established, "sentence": "readings drift"}
+    found = {"verdict": "named", "accepted": ["toe"], "set": ["toe"], "families": [toe, slow]}
+    return found | {"remainder": {"probability": remains}} | changes
+
+
+def test_a_likely_family_and_a_likely_remainder_are_said_in_one_notice():
+    (notice,) = likely_beside(_found(drift=ABOVE, remains=0.624))
+    assert notice.kind == "incomplete"
+    assert (
+        "readings drift; something that no effect explains remains, 62 %; the final model does without" in notice.text
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, False),
+        ({"drift": ABOVE}, True),
+        ({"remains": ABOVE}, True),
+        ({"drift": ABOVE, "established": True}, False),
+        ({"drift": ABOVE, "accepted": ["toe", "sensor_drift"]}, False),
+        ({"drift": ABOVE, "verdict": "ambiguous"}, True),
+        ({"drift": ABOVE, "verdict": "ambiguous", "set": ["toe", "sensor_drift"]}, False),
+        ({"drift": ABOVE, "verdict": "partial"}, False),
+        ({"drift": ABOVE, "verdict": "unknown"}, False),
+        ({"drift": ABOVE, "verdict": "nothing-missing"}, False),
+    ],
+)
+def test_it_is_said_where_the_final_model_lacks_it(changes, said):
+    assert bool(likely_beside(_found(**changes))) is said
