@@ -2,14 +2,14 @@
 
 import re
 from collections.abc import Sequence
-from datetime import date
 
 import numpy as np
 
 from wirebayes.errors import shown
 from wirebayes.io.bench.compound_times import is_spelt, spelt_s
+from wirebayes.io.bench.dates import days_s
 from wirebayes.io.bench.quantities import Unit
-from wirebayes.io.bench.sheet import MONTHS, is_moment, is_number, is_value, moment
+from wirebayes.io.bench.sheet import is_moment, is_number, is_value, moment
 from wirebayes.io.bench.summer_time import without_summer_time
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Undecided
@@ -23,7 +23,6 @@ _ROUND = 0.5 * _DAY  # of a clock with hands
 _MIDNIGHT = 0.5 * _DAY  # a fall larger than this is a new day
 _PUT_BACK = 3600.0  # clocks are put back by an hour in autumn
 _LATE = 3.0  # times the least time between readings: nobody who counts from zero begins so late
-_LAST_MONTH = 12  # a larger number in a date is a day
 CALLED = {60.0: "minutes and seconds", 3600.0: "hours and minutes"}  # by the seconds of one of the first part
 _WRITTEN = {60.0: "mm:ss", 3600.0: "hh:mm"}  # the same, as a unit of `--map`
 _WITHOUT_DOUBT = (
@@ -34,10 +33,6 @@ UNDERSTOOD = (
     "a time such as 0:01:30 or 10:01:30 AM, or with a date such as 2024-05-31 10:01:30, 2024-05-31T10:01:30+02:00, "
     "20240531 10:01:30, 31.05.2024 10:01:30, 05/31/2024 10:01:30 AM or 31-May-2024 10:01:30"
 )
-
-
-class UndecidedDates(Undecided):
-    """Dates may begin with the day or with the month."""
 
 
 def looks_like_a_moment(cell: str) -> bool:
@@ -103,7 +98,7 @@ def seconds(table: RawTable, column: int, unit: Unit | None, *, durations: bool 
     values = _values(moments, of_clock, leading)
     lines = [row.line for row in table.rows]
     if moments[0]["date"] is not None:
-        days = _days(table, column, moments, unit)
+        days = days_s(table, column, moments, unit)
         time_s = (days - days[0]) + values
         if moments[0]["zone"] is not None:
             return time_s, True, []
@@ -184,7 +179,7 @@ def calendar_s(table: RawTable, column: int, unit: Unit | None) -> Floats:
     """
     moments = _moments(table, column, unit)
     of_day = [_value(found, _HOUR) for found in moments]
-    return _days(table, column, moments, unit) + np.array(of_day)
+    return days_s(table, column, moments, unit) + np.array(of_day)
 
 
 def _check_hours_go_beyond_twelve(table: RawTable, column: int, values: Floats) -> None:
@@ -333,70 +328,3 @@ def _falls(moments: _Moments, leading: float) -> int:
     """How often times fall whose first part counts so many seconds."""
     times = [_value(m, leading) for m in moments]
     return int(np.sum(np.diff(times) < 0.0))
-
-
-def _days(table: RawTable, column: int, moments: _Moments, unit: Unit | None) -> Floats:
-    """Seconds from the beginning of the calendar to each date."""
-    stated = None if unit is None or unit.clock is None else unit.clock.day_first
-    day_first = _day_first(table, column, moments) if stated is None else stated
-    days = []
-    for row, found in zip(table.rows, moments, strict=True):
-        year, month, day = _date_parts(found, day_first)
-        full_year = year if year > 99 else 2000 + year
-        try:
-            days.append(date(full_year, month, day).toordinal() * _DAY)
-        except ValueError:
-            raise table.complain(row.line, column, repr(found["date"]), "a date such as 2024-05-31") from None
-    return np.array(days)
-
-
-def _date_parts(found: re.Match[str], day_first: bool) -> list[int]:
-    """Year, month and day of a date."""
-    text = found["date"]
-    if found["compact"]:
-        year, month, day = text[:4], text[4:6], text[6:]
-        return [int(year), int(month), int(day)]
-    parts = re.split(r"[-./ ]+", text)
-    if found["named"]:
-        day, name, year = parts
-        month_number = MONTHS[name[:3].lower()]
-        return [int(year), month_number, int(day)]
-    numbers = [int(part) for part in parts]
-    if not found["year_last"]:
-        return numbers
-    if day_first or "." in text:
-        return numbers[::-1]
-    month, day, year = numbers
-    return [year, month, day]
-
-
-def _day_first(table: RawTable, column: int, moments: _Moments) -> bool:
-    """Whether days stand before months between slashes or dashes: a number above 12 decides for the whole column.
-
-    Dates between points are written in countries that begin with the day. Where nothing decides and there are several
-    dates, the time between them is not known.
-    """
-    rows: dict[str, int] = {}
-    for i, found in enumerate(moments):
-        if found["year_last"] and "." not in found["date"]:
-            rows.setdefault(found["date"], i)
-    unclear = []
-    first_numbers, second_numbers = [], []
-    for text, row in rows.items():
-        first, second = [int(part) for part in re.split(r"[-/]", text)[:2]]
-        first_numbers.append(first)
-        second_numbers.append(second)
-        if first != second:
-            unclear.append(row)
-    if max(second_numbers, default=0) > _LAST_MONTH:
-        return False
-    if max(first_numbers, default=0) > _LAST_MONTH:
-        return True
-    if unclear and len(rows) > 1:
-        row = min(unclear)
-        where = table.where(table.rows[row].line, column)
-        found_date = f"found {moments[row]['date']!r}, which may begin with the day or with the month"
-        map_to = f"--map {table.header[column]}=time"
-        answers = {f"{map_to} [dd/mm/yyyy]": "with the day", f"{map_to} [mm/dd/yyyy]": "with the month"}
-        raise UndecidedDates(f"{where}: {found_date}", "which", answers)
-    return True

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from wirebayes.errors import InputError
-from wirebayes.io.bench.clock import UndecidedDates, is_clock, seconds
+from wirebayes.io.bench.clock import is_clock, seconds
+from wirebayes.io.bench.dates import UndecidedDates
 from wirebayes.io.bench.quantities import Unit
 from wirebayes.io.bench.table import RawTable
 from wirebayes.numeric.typing import Floats
