@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from analyses.project.density import Body, functions_of, local_names, nodes
-from analyses.project.measures import homonyms, trees
+from analyses.project.measures import LONG_FILE, homonyms, trees
 
 ROOT = Path(__file__).parent.parent
 
@@ -133,6 +133,11 @@ def constants_without_a_reason(written: Trees, sources: dict[Path, str]) -> list
             ):
                 found.append(f"{path.relative_to(ROOT)}:{node.lineno} {target.id}")
     return found
+
+
+def test_no_file_is_long(sources):
+    lengths = {str(path.relative_to(ROOT)): source.count("\n") for path, source in sources.items()}
+    assert {path: lines for path, lines in lengths.items() if lines > LONG_FILE} == {}
 
 
 def test_constants_have_a_reason(written, sources):

@@ -18,14 +18,14 @@ from wirebayes.robot.history.beside import beside, beside_fresh
 from wirebayes.robot.history.follow import RESTART
 from wirebayes.robot.history.history import roll_and_pitch, with_payload
 from wirebayes.robot.history.live_input import checked_number, checked_reading, checked_vector, refuse_bad
-from wirebayes.robot.history.live_pose import LivePose, row_quantiles
+from wirebayes.robot.history.live_pose import LivePose
 from wirebayes.robot.history.readings import Information, Sensors, reading_weight, sensors
 from wirebayes.robot.history.unknowns import LogUnknowns, Uncertain, slopes, unknowns
 from wirebayes.robot.mechanics import firmware, wire_doubts
 from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
-from wirebayes.robot.mechanics.rotation import antisymmetric, matrix
-from wirebayes.robot.mechanics.winches import mean_of_each_winch, of_each_leg, of_each_winch
+from wirebayes.robot.mechanics.rotation import antisymmetric
+from wirebayes.robot.mechanics.winches import of_each_leg, of_each_winch
 from wirebayes.robot.motion import balance, forward, inverse, mixed, path, plausible
 from wirebayes.robot.motion.creep import HoldCreep
 
@@ -355,28 +355,9 @@ class LiveEstimator:
 
     def _pose(self, time_s: float, nominal: Floats) -> LivePose:
         """The draws, moved by the readings, in numbers."""
-        robot, w = self.robot, self.robot.legs
         centre = self._R[self._n if self._reads else -1]
-        own = self._own_draws(centre)
-        mean, sd = own.mean(0), own.std(0)
-        low, high = row_quantiles(own[:, :3], np.array([0.05, 0.95]))
-        wanted, wanted_sd = mean[6 : 6 + w], sd[6 : 6 + w]
-        change = of_each_winch(robot, wanted - nominal)
-        return LivePose(
-            time_s,
-            mean[:3],
-            sd[:3],
-            low,
-            high,
-            matrix(mean[3:6]) @ centre,
-            sd[3:6],
-            of_each_winch(robot, wanted),
-            of_each_winch(robot, wanted_sd),
-            change,
-            change / mean_of_each_winch(robot, robot.lines),
-            mean[6 + w :],
-            float(self._live[: self._n].mean()),
-        )
+        held = float(self._live[: self._n].mean())
+        return LivePose.of(time_s, self.robot, self._own_draws(centre), centre, nominal, held)
 
     def _own_draws(self, centre: Floats) -> Floats:
         """Position, rotation from `centre`, joint values and tensions of the draws that count; NaN if none does."""

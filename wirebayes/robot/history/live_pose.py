@@ -5,6 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from wirebayes.numeric.typing import Floats
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.mechanics.winches import mean_of_each_winch, of_each_winch
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,48 @@ class LivePose:
     straight_correction_m: Floats
     tension_N: Floats
     held: float
+
+    @classmethod
+    def of(
+        cls, time_s: float, robot: Robot, draws: Floats, centre: Floats, nominal_m: Floats, held: float
+    ) -> "LivePose":
+        """The same by draws of all that is unknown.
+
+        Parameters
+        ----------
+        time_s : float
+        robot : Robot
+            Of w legs.
+        draws : (n, 6 + 2 w) array
+            Position, m, rotation from `centre`, rad, joint values, m, and tensions, N.
+        centre : (3, 3) array
+            Orientation that the rotations of the draws start from.
+        nominal_m : (w,) array
+            Joint values, were there no creep.
+        held : float
+            Share of the draws that hold the platform.
+        """
+        first_tension = 6 + robot.legs
+        mean = draws.mean(0)
+        sd = draws.std(0)
+        low, high = row_quantiles(draws[:, :3], np.array([0.05, 0.95]))
+        wanted = mean[6:first_tension]
+        change = of_each_winch(robot, wanted - nominal_m)
+        return cls(
+            time_s,
+            mean[:3],
+            sd[:3],
+            low,
+            high,
+            matrix(mean[3:6]) @ centre,
+            sd[3:6],
+            of_each_winch(robot, wanted),
+            of_each_winch(robot, sd[6:first_tension]),
+            change,
+            change / mean_of_each_winch(robot, robot.lines),
+            mean[first_tension:],
+            held,
+        )
 
 
 def row_quantiles(values: Floats, probability: Floats) -> Floats:
