@@ -1,5 +1,6 @@
 """When lengths of a calibration may be set: the joint test at its threshold, and drawn robots with wrong anchors."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,7 +12,7 @@ from tests.robot import drawn
 from tests.robot.cases import session_header
 from wirebayes.errors import InputError
 from wirebayes.progress import silent
-from wirebayes.robot.mechanics import draws
+from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.mechanics.rotation import vector
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration import answer, search, session_file
@@ -73,6 +74,42 @@ def test_wrong_anchors_held_exact_are_not(seed):
     assert "misfit" in {one["kind"] for one in found["warnings"]}
 
 
+def _misfits(found):
+    assert not found["usable"]
+    return [one["text"] for one in found["warnings"] if one["kind"] == "misfit"]
+
+
+@pytest.mark.parametrize(("seed", "times"), [(0, 1.1), (2, 0.8)])
+def test_a_mass_that_is_wrong_is_named_in_place_of_all_sensors(seed, times):
+    robot, prior, session, rng = _session(seed, sd=0.005)
+    readings = _read(robot, prior, session, rng)
+    weighed = replace(robot, mass_kg=times * robot.mass_kg)
+    texts = _misfits(_reported(weighed, prior, session, readings))
+    found = [re.match(r"a platform of (\S+) \+- (\S+) kg would explain what contradicts", text) for text in texts]
+    mass, sd = next([float(value) for value in one.groups()] for one in found if one)
+    assert abs(mass - robot.mass_kg) < 4 * sd < 0.1 * robot.mass_kg
+    assert not any("several tension sensors" in text for text in texts)
+
+
+def test_errors_of_sensors_are_not_taken_for_another_mass():
+    robot, prior, session, rng = _session(0, sd=0.005)
+    readings = _read(robot, prior, session, rng).reshape(-1, robot.legs) + 20.0 * np.arange(robot.legs)
+    texts = _misfits(_reported(robot, prior, session, readings.ravel()))
+    assert not any("a platform of" in text for text in texts)
+
+
+@pytest.mark.parametrize("times", [1.3, 0.8])
+def test_a_stiffness_that_is_wrong_is_named(times):
+    robot, prior, session, rng = _session(2, sd=0.002)
+    prior = replace(prior, spread=0.02)
+    readings = _read(robot, prior, session, rng)
+    k1 = times * prior.line.parameters["k1"]
+    stated = replace(prior.line, parameters={**prior.line.parameters, "k1": k1})
+    texts = _misfits(_reported(robot, replace(prior, line=stated), session, readings))
+    found = [re.match(r"wires whose stiffness k1 is on average (\S+) times what is stated", text) for text in texts]
+    assert next(float(one[1]) for one in found if one) == pytest.approx(1 / times, rel=0.1)
+
+
 def test_the_verdict_turns_at_its_threshold():
     found = SimpleNamespace(converged=True, noise=SimpleNamespace(balance=0.0))
     seen = SimpleNamespace(determined=4, of=4)
@@ -104,6 +141,20 @@ def test_poses_without_which_joint_values_agree_better_are_asked_for(monkeypatch
         assert "to 0.7 mm, and to 0.23 mm if the poses are unknown" in asked[0].text
 
 
+def test_a_flat_robot_is_not_doubted_because_it_is_flat():
+    robot = schema.read_robot_file("hangprinter-4")
+    in_plane = np.array([1.0, 0.0, 1.0])
+    lower, upper = robot.lower_m * in_plane, robot.upper_m * in_plane
+    flat = replace(robot, exit_m=robot.exit_m * in_plane, lower_m=lower, upper_m=upper)
+    for one, axis, doubted in ((flat, 1, False), (flat, 0, True), (robot, 1, True)):
+        of = Unknowns(one, _session(0)[1], StatedErrors(exit_m=0.01))
+        spread = np.eye(of.count)
+        known = 3 * np.arange(one.legs) + axis  # and found exactly where the file has them
+        spread[known, known] = 1e-6
+        found = SimpleNamespace(unknowns=of, covariance=spread, state=SimpleNamespace(white=np.zeros(of.count)))
+        assert search._too_good(found) is doubted
+
+
 def replace_in(namespace, **changed):
     return SimpleNamespace(**{**vars(namespace), **changed})
 
@@ -116,7 +167,7 @@ def test_exact_joint_values_are_doubted_unless_readings_are_a_hundred_standard_e
         begun.append(unknowns.errors.joint_m)
         return SimpleNamespace(unknowns=unknowns, converged=True, noise=SimpleNamespace(balance=0.0))
 
-    for name, value in (("trust", 0.001), ("lost", True), ("misfit", times * 100.0**2)):
+    for name, value in (("trust", 0.001), ("lost", True), ("misfit", times * 100.0**2), ("unlike_wires", ())):
         monkeypatch.setattr(search, name, lambda found, value=value: value)
     monkeypatch.setattr(search, "best", best)
     robot, prior, session, rng = _session(0)
@@ -138,13 +189,15 @@ def test_the_joint_test_keeps_its_level_and_sees_each_part():
         readings = truth @ J.T + noise
         mode = readings @ J @ spread
         cost = ((readings - mode @ J.T) ** 2).sum(1) + (mode**2).sum(1)
-        return joint_test(cost, count, mode, np.broadcast_to(spread, (many, 9, 9)), legs)
+        return joint_test(cost, count, mode, np.broadcast_to(spread, (many, 9, 9)), [slice(0, legs), slice(legs, 9)])
 
     truth, noise = rng.standard_normal((many, 9)), rng.standard_normal((many, count))
     level = (p_of(truth, noise) < 0.01).mean()
-    assert 0.004 < level < 0.014  # two tests that are not independent: at most a hundredth
+    assert 0.004 < level < 0.014  # three tests that are not independent: at most a hundredth
     moved = truth + np.array([5.0, 5.0, 0, 0, 0, 0, 0, 0, 0])
     assert (p_of(moved, noise) < 0.01).mean() > 0.95  # references beyond their prior, residuals as expected
+    of_wires = truth + np.array([0, 0, 0, 0, 5.0, 5.0, 0, 0, 0])
+    assert (p_of(of_wires, noise) < 0.01).mean() > 0.95
     assert (p_of(truth, 2.0 * noise) < 0.01).mean() > 0.95
 
 

@@ -56,16 +56,19 @@ def lengths_tell(unknowns: Unknowns, read: Bools) -> bool:
 
 def _joint_probability(found: RobotPosterior) -> float:
     """`trust.joint_test` of what was read and stated."""
-    e = found.equations
+    cost, count = whole_cost(found)
     unknowns = found.unknowns
+    alone = [unknowns.geometry, unknowns.of_lines]
+    p = joint_test(np.array([cost]), count, found.state.white[None], found.covariance[None], alone)
+    return float(p[0])
+
+
+def whole_cost(found: RobotPosterior) -> tuple[float, float]:
+    """Sum of squares of what was read and stated, the prior's included, and its degrees of freedom."""
+    e = found.equations
     holds, _, own = e.by_hold.shape
     count = float(e.known.sum()) - holds * own + _taken_up(found)
-    cost = np.array([found.cost - _beyond_usual(found)])
-    first = np.r_[0 : unknowns.slices["wires"].start, unknowns.references]
-    white = found.state.white[first]
-    spread = found.covariance[np.ix_(first, first)]
-    p = joint_test(cost, max(count, 1.0), white[None], spread[None], len(first))
-    return float(p[0])
+    return found.cost - _beyond_usual(found), max(count, 1.0)
 
 
 def _taken_up(found: RobotPosterior) -> float:

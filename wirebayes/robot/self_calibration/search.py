@@ -7,7 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtr, fdtrc
 
+from wirebayes.numeric.typing import Bools
 from wirebayes.progress import Progress
+from wirebayes.result_warnings import Notice
+from wirebayes.robot.self_calibration.another_weight import OtherMass, other_mass
 from wirebayes.robot.self_calibration.equations import Holds
 from wirebayes.robot.self_calibration.estimate import estimate, progress_of
 from wirebayes.robot.self_calibration.posterior import RobotPosterior
@@ -16,6 +19,7 @@ from wirebayes.robot.self_calibration.seeds import best, near_requests
 from wirebayes.robot.self_calibration.sensors import Suspects, suspects
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.unknowns import Unknowns
+from wirebayes.robot.self_calibration.unlike_wires import unlike_wires
 
 RATHER = 3.0  # times smaller errors of loops or balance, before stated poses are taken for requests
 _WELL, _CHANCE = 0.1, 1e-4  # of the standard deviation before; of estimates that near to their prior's mean
@@ -45,6 +49,10 @@ class Searched:
         Probability of readings and references that contradict model and priors as much.
     at_fault : Suspects or None
         Which sensor would explain what contradicts; None where nothing does, or nothing that a sensor could.
+    mass : OtherMass or None
+        Of the platform, with which nothing would contradict.
+    wires : tuple of Notice
+        How unlike what is stated wires would be with which nothing would contradict.
     inexact : bool
         Joint values that were taken as exact are not.
     requested : bool
@@ -64,6 +72,8 @@ class Searched:
     requested: bool
     too_near: bool = False
     closer: float = 1.0
+    mass: OtherMass | None = None
+    wires: tuple[Notice, ...] = ()
 
 
 def searched(
@@ -94,6 +104,8 @@ def searched(
     found, holds, requested, closer = _rather_requests(found, holds, too_good, doubted, progress)
     p = trust(found)
     at_fault = _sensor_at_fault(found, holds, p, progress)
+    mass = _other_mass(found, holds, p, progress)
+    wires = unlike_wires(found) if found.converged and p < SIGNIFICANT else ()
     inexact = unknowns.errors.joint_m == 0 and not (found.converged and p >= SIGNIFICANT)
     if inexact and misfit(found) < _GROSS:
         # how far from exact the joint values are tells more than that there is no answer
@@ -102,15 +114,25 @@ def searched(
         if other.converged or not found.converged:
             found = other
     too_near = too_good and not requested
-    return Searched(found, holds, p, at_fault, inexact, requested, too_near, closer)
+    return Searched(found, holds, p, at_fault, inexact, requested, too_near, closer, mass, wires)
 
 
 def _sensor_at_fault(found: RobotPosterior, holds: Holds, p: float, progress: Progress) -> Suspects | None:
     """Which sensor would explain what contradicts; None where nothing does, or loops are too far open to tell."""
-    contradicts = p < SIGNIFICANT or found.noise.balance > _UNSEEN
-    if not contradicts or lost(found):
+    return suspects(found, holds, progress_of(progress, "sensors")) if _contradicts(found, p) else None
+
+
+def _other_mass(found: RobotPosterior, holds: Holds, p: float, progress: Progress) -> OtherMass | None:
+    """Which mass of the platform would explain what contradicts; None where tensions that would tell were not read."""
+    read = np.isfinite(holds.tension_N).all(1).any()
+    if not read or not _contradicts(found, p):
         return None
-    return suspects(found, holds, progress_of(progress, "sensors"))
+    return other_mass(found, holds, progress_of(progress, "mass"))
+
+
+def _contradicts(found: RobotPosterior, p: float) -> bool:
+    """Whether something contradicts, and loops are not too far open to tell what."""
+    return (p < SIGNIFICANT or found.noise.balance > _UNSEEN) and not lost(found)
 
 
 class _Chosen(NamedTuple):
@@ -171,7 +193,7 @@ def _too_good(found: RobotPosterior) -> bool:
     Then the joint values were computed from the poses and the file: they are commands, and say nothing of where the
     robot went.
     """
-    part = np.r_[0 : found.unknowns.slices["wires"].start, found.unknowns.references]
+    part = np.flatnonzero(_may_err(found.unknowns))
     values, vectors = np.linalg.eigh(found.covariance[np.ix_(part, part)])
     determined = np.sqrt(np.maximum(values, 0.0)) < _WELL
     deviations = vectors[:, determined].T @ found.state.white[part]
@@ -179,3 +201,18 @@ def _too_good(found: RobotPosterior) -> bool:
         return False
     so_near = chdtr(int(determined.sum()), float(deviations @ deviations))
     return bool(so_near < _CHANCE)
+
+
+def _may_err(unknowns: Unknowns) -> Bools:
+    """(m,) Which unknowns are points, drums and references that a file may state wrongly.
+
+    Points of a flat robot lie in its plane by design, whatever error is stated: that they are found there is no sign.
+    """
+    out = np.zeros(unknowns.count, bool)
+    out[unknowns.geometry] = True
+    robot = unknowns.robot
+    flat = (np.ptp(robot.exit_m, axis=0) == 0) & (robot.lower_m == robot.upper_m)
+    for name in ("exit", "platform"):
+        part = unknowns.slices[name]
+        out[part] &= np.resize(~flat, part.stop - part.start)
+    return out

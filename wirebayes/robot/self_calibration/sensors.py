@@ -58,6 +58,11 @@ class Suspects:
     suffices: Bools
 
     @property
+    def whole(self) -> Bools:
+        """(w,) Which sensors alone would explain all that contradicts."""
+        return np.asarray((self.p_alone >= SIGNIFICANT) | self.suffices)
+
+    @property
     def wires(self) -> list[int]:
         """Wires, from 0, one of whose sensors is at fault; none where nothing or no single sensor explains it."""
         if not self.p_none < SIGNIFICANT:  # nor where it is not known
@@ -274,8 +279,7 @@ def sensor_notices(found: Suspects | None) -> list[Notice]:
 def _how_much(found: Suspects) -> str:
     """How much of what contradicts any of the sensors explains; empty where it is all."""
     share = 100 * found.explains[found.wires].min()
-    whole = (found.p_alone >= SIGNIFICANT) | found.suffices
-    all_explain = bool(whole[found.wires].all())
+    all_explain = bool(found.whole[found.wires].all())
     return "" if all_explain or share >= _NEARLY_ALL else f"{share:.0f} % of "
 
 

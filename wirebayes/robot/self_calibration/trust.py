@@ -1,5 +1,7 @@
 """Whether a calibration's residuals, and its estimates against their priors, are as large as they should be."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.special import chdtrc
 
@@ -16,13 +18,13 @@ _LEAST = 1e-4  # probability: farther out, no error is known to be Gaussian
 _UNLEARNT = 1e-6  # of a prior's variance: of a length of which the readings say less, there is nothing to be tested
 
 
-def joint_test(cost: Floats, count: float, white: Floats, spread: Floats, count_alone: int) -> Floats:
+def joint_test(cost: Floats, count: float, white: Floats, spread: Floats, alone: Sequence[slice]) -> Floats:
     """Probability ``(m,)`` of readings and estimates that contradict model and priors at least as much.
 
     Under the model the least sum of squares, residuals and unknowns in units of their errors, is chi-squared with as
     many degrees of freedom as there are readings. Geometry that is wrong, but held exact, often hides in the reference
-    lengths, which are few among them all; so those are tested alone too: the covariance of their estimates is what the
-    readings took off that of their prior. The smaller of both probabilities counts, times two.
+    lengths, and a stiffness that is wrong in the wires' deviations from their line. Both are few among them all; so
+    each is tested alone too (`beyond_prior`). The smallest of the probabilities counts, times how many there are.
 
     Parameters
     ----------
@@ -31,17 +33,36 @@ def joint_test(cost: Floats, count: float, white: Floats, spread: Floats, count_
     count : float
         Number of readings, less what unknowns without a prior take up.
     white : (m, d) array
-        Mode in units of the prior, references first.
+        Mode in units of the prior.
     spread : (m, d, d) array
         Posterior covariance in these units.
-    count_alone : int
-        Number of first unknowns that are tested alone too.
+    alone : sequence of slice
+        Unknowns that are tested alone too.
     """
-    reference = white[:, :count_alone, None]
-    learnt = (1.0 + _UNLEARNT) * np.eye(count_alone) - spread[:, :count_alone, :count_alone]
-    moved = (reference * solve(learnt, reference)).sum((1, 2))
-    least = np.minimum(chdtrc(count, np.maximum(cost, 0.0)), chdtrc(count_alone, np.maximum(moved, 0.0)))
-    return np.minimum(1.0, 2.0 * least)
+    tests = [chdtrc(count, np.maximum(cost, 0.0))]
+    for part in alone:
+        moved = beyond_prior(white[:, part], spread[:, part, part])
+        tests.append(chdtrc(part.stop - part.start, moved))
+    return np.minimum(1.0, len(tests) * np.min(tests, axis=0))
+
+
+def beyond_prior(white: Floats, spread: Floats) -> Floats:
+    """Squared distance ``(m,)`` of estimates from their prior mean, in standard deviations that they have by chance.
+
+    The covariance of estimates about the prior's mean is what the readings took off that of the prior. So much, too,
+    would the sum of squares fall if nothing had been known of them.
+
+    Parameters
+    ----------
+    white : (m, d) array
+        In units of the prior.
+    spread : (m, d, d) array
+        Posterior covariance in these units.
+    """
+    estimate = white[..., None]
+    learnt = (1.0 + _UNLEARNT) * np.eye(white.shape[1]) - spread
+    moved = (estimate * solve(learnt, estimate)).sum((1, 2))
+    return np.asarray(np.maximum(moved, 0.0))
 
 
 def chance(p: float) -> str:

@@ -129,6 +129,18 @@ class Unknowns:
         return slice(first, first + self.robot.legs)
 
     @property
+    def geometry(self) -> slice:
+        """Where points, drums and reference errors stand."""
+        return slice(0, self.references.stop)
+
+    @property
+    def of_lines(self) -> slice:
+        """Where the lines' parameters and what each specimen differs by stand."""
+        first = self.references.stop
+        biases = self.robot.legs if self.prior.bias_sd_N > 0 else 0
+        return slice(first, self.slices["wires"].stop - biases)
+
+    @property
     def drum_columns(self) -> Indices:
         """(w,) Where the error of each leg's drum stands."""
         robot = self.robot
