@@ -159,6 +159,13 @@ def test_places_that_the_proposal_overlooks(nats: float, again: int, finished: b
     assert ("makes too little of some places" in state.why) is (finished and not converged)
 
 
+def test_places_that_are_overlooked_at_the_last_step_end_the_run() -> None:
+    """No step is left with which a better proposal could go on: a block of none has no walkers."""
+    state, _ = looked(draws(64), overlooked=OUTWEIGHS + 0.1, most_steps=64)
+    assert state.finished and not state.converged
+    assert state.why.startswith("not converged after 64 steps: the proposal makes too little of some places")
+
+
 def after(steps: int, ess: float, memory: float = 1.0, evaluations: int = 0, **learned: float) -> Sampling:
     """A run that was looked at after so many steps."""
     about = Diagnostics(np.full(D, memory), np.array([ess, 2.0 * ess, 3.0 * ess]), np.ones(D))

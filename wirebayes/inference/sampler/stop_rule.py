@@ -58,7 +58,7 @@ def apply(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
             most = float(found.r_hat.max())
             why = f"after {steps} steps: smallest ESS {least:.0f}, largest nested R-hat {most:.4f}"
             return replace(state, finished=True, converged=True, why=why)
-        if learned.again >= MOST_AGAIN:
+        if learned.again >= MOST_AGAIN or steps >= policy.most_steps:
             why = (
                 f"not converged after {steps} steps: the proposal makes too little of some places, by a factor of "
                 f"e^{beyond:.1f} (allowed e^{OUTWEIGHS:.1f}); a narrow neck or a far mode may be missing"
