@@ -49,6 +49,18 @@ def check_derivatives(robot, law, seed=5):
     assert n >= 3
 
 
+def test_a_taut_wire_that_ends_where_it_begins_has_a_finite_stiffness():
+    robot = schema.read_robot_file("cogiro-desk")
+    exit_m = robot.exit_m[:1].T
+    shape = statics.geometry(robot, exit_m - robot.platform_m[:1].T, np.eye(3)[..., None])
+    assert shape.straight_m[0] == 0.0
+    taut = np.ones((robot.legs, 1))
+    with np.errstate(all="raise"):
+        gradient, hessian = statics.unbalance_and_stiffness(robot, shape, np.eye(3)[..., None], taut, taut)
+    assert np.isfinite(gradient).all()
+    assert np.isfinite(hessian).all()
+
+
 def test_nothing_is_computed_with_memory_that_holds_no_numbers_yet(monkeypatch):
     """What numpy.empty returns may be anything, as a NaN that signals when it is added to."""
     signalling = np.array(0x7FF0000000000001, dtype=np.uint64).view(np.float64)

@@ -16,6 +16,7 @@ from wirebayes.robot.mechanics.vectors import cross, norm
 from wirebayes.robot.mechanics.wires import Wires, energy, tension
 
 _NOWHERE = 1e-300  # m; a wire without length has no direction, and no pull
+_SHORTEST = 1e-9  # m; across a taut wire the stiffness grows without end as that shortens
 
 
 @dataclass(frozen=True)
@@ -184,7 +185,7 @@ def unbalance_and_stiffness(
     J = jacobian(robot, shape)
     lines = robot.lines[:, None]
     pull = tension_N * lines
-    beta = pull / shape.straight_m
+    beta = pull / np.maximum(shape.straight_m, _SHORTEST)
     alpha = slope_N_m * (lines * lines) - beta
     degrees = robot.degrees
     force = robot.mass_kg * GRAVITY
