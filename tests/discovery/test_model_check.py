@@ -75,6 +75,18 @@ def test_the_level_of_several_fits_keeps_the_risk_of_the_command() -> None:
     assert ModelCheck(0.041, level(1), 999).passed is True
 
 
+@pytest.mark.parametrize(("samples", "said"), [(1, False), (3, True)])
+def test_a_failed_check_of_several_samples_says_that_they_may_differ(samples, said) -> None:
+    (notice,) = ModelCheck(0.001, ALPHA, 999, ("toe",), samples=samples).notices
+    assert ("or the 3 samples differ" in notice.text) is said
+
+
+def test_the_check_knows_to_how_many_samples_the_model_was_fitted(tmp_path: Path) -> None:
+    experiment = simulated(tmp_path)
+    job = Job("", (experiment, replace(experiment, name="another")))
+    assert check_model(job, simulations=19).samples == 2
+
+
 def test_one_experiment_gets_the_p_that_discover_reports(tmp_path: Path) -> None:
     experiment = simulated(tmp_path)
     check = check_model(Job("", (experiment,)), seed=5, simulations=19)

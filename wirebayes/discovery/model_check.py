@@ -55,6 +55,8 @@ class ModelCheck:
         Why it was not checked.
     with_effects : bool
         Whether the fitted model has effects.
+    samples : int
+        To how many samples it was fitted at once.
     """
 
     p: float | None
@@ -64,6 +66,7 @@ class ModelCheck:
     gross_errors: tuple[GrossError, ...] = ()
     reason: str = ""
     with_effects: bool = False
+    samples: int = 1
 
     @property
     def passed(self) -> bool | None:
@@ -107,7 +110,16 @@ class ModelCheck:
         return (
             f"{model} does not describe the readings ({self._p_in_words}; it fails below {self.alpha:.2g}): "
             "parameters and predictions can be wrong by more than their intervals. "
-            f"The readings deviate most towards {directions}"
+            f"The readings deviate most towards {directions}{self._samples_in_words()}"
+        )
+
+    def _samples_in_words(self) -> str:
+        """What else may be the reason where several samples were fitted at once."""
+        if self.samples == 1:
+            return ""
+        return (
+            f"; or the {self.samples} samples differ, where one set of parameters was fitted to all of them: fits of "
+            "each by itself show it"
         )
 
     def to_dict(self) -> ModelCheckResult:
@@ -172,6 +184,7 @@ def check_model(
         tuple(gate.struck),
         "",
         bool(effects),
+        len(job.experiments),
     )
 
 
