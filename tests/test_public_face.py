@@ -152,6 +152,61 @@ def test_what_is_no_test_at_all_is_named():
         wb.check(wb.from_arrays(**GOOD, **ABOUT), output=3)
 
 
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda test: wb.read_experiments(3), "path: found 3, expected a path"),
+        (lambda test: wb.read_robot(None), "robot: found None, expected a path"),
+        (lambda test: wb.load(3), "folder: found 3, expected a path"),
+        (lambda test: wb.write_report(None), "folder: found None, expected a path"),
+        (lambda test: wb.new_experiment(3), "folder: found 3, expected a path"),
+        (lambda test: wb.reproduce_paper(3), "output: found 3, expected a path"),
+        (lambda test: wb.import_robot(3, "robot.toml"), "files: found 3, expected a path"),
+        (lambda test: wb.import_bench([3], length_mm=1000), "raw: found 3, expected a path"),
+        (lambda test: wb.import_bench("x.csv", length_mm="1 m"), "--length-mm: found '1 m', expected a finite number"),
+        (lambda test: wb.import_bench("x.csv", length_mm=1, mapping=3), "mapping: found 3, expected a name or several"),
+        (lambda test: wb.batch(3), "sources: found int, expected paths of files or Experiments"),
+        (lambda test: wb.fit(test, own_effects=3), "own_effects: found 3, expected a path"),
+        (lambda test: wb.fit(test, effects=[3]), "effects: found 3, expected a name or several"),
+        (lambda test: wb.fit(test, together=3), "--together: found 3, expected a material"),
+        (lambda test: wb.discover(test, without=3), "without: found 3, expected a name or several"),
+        (lambda test: wb.plan(test, budget_min="1 h"), "--budget-min: found '1 h', expected a finite number above 0"),
+        (lambda test: wb.plan(test, aim=3), "--aim: found 3, expected a name or several"),
+        (lambda test: wb.pose("linear-7", draws=0), "--draws: found 0, expected a whole number, 1 or more"),
+        (lambda test: wb.export("linear-7", draws="x"), "--draws: found 'x', expected a whole number, 1 or more"),
+        (lambda test: wb.pose("linear-7", payload="1 kg"), "--payload: found '1 kg', expected kilograms, 0 or more"),
+        (lambda test: wb.pose("linear-7", tolerance=None), "--tolerance: found None, expected a finite number above 0"),
+        (lambda test: wb.pose("linear-7", specimen_spread="5 %"), "--specimen-spread: found '5 %', expected a number"),
+        (
+            lambda test: wb.calibrate("linear-7", {}, tension_sd="x"),
+            "--tension-sd: found 'x', expected a finite number",
+        ),
+        (
+            lambda test: wb.calibrate("linear-7", {}, anchor_sd=None),
+            "--anchor-sd: found None, expected a finite number",
+        ),
+        (lambda test: wb.calibrate("linear-7", {}, next_poses=1.5), "--next-poses: found 1.5, expected a whole number"),
+        (lambda test: wb.simulate_tests(parameters=3), "parameters: found 3, expected values by name"),
+        (lambda test: wb.simulate_tests(unload=-1), "--unload: found -1, expected a whole number, 0 or more"),
+        (
+            lambda test: wb.simulate_tests(resolution=-1),
+            "--resolution: found -1, expected a finite number of",
+        ),
+        (lambda test: wb.from_arrays(**GOOD, **ABOUT, control=[]), "control: found .., expected .displacement."),
+        (
+            lambda test: wb.from_arrays(**GOOD, **ABOUT, unrecorded_holds=3),
+            "unrecorded_holds: found 3, expected",
+        ),
+        (lambda test: wb.from_arrays(**GOOD, **ABOUT, unrecorded_holds=[3]), "unrecorded_holds.0.: found 3, expected"),
+    ],
+)
+def test_an_argument_of_a_wrong_kind_is_refused_in_one_line(call, message):
+    test = wb.from_arrays(**GOOD, **ABOUT)
+    with pytest.raises(wb.InputError, match=message) as refused:
+        call(test)
+    assert "\n" not in str(refused.value)
+
+
 def test_a_column_may_come_from_a_generator_and_no_unrecorded_hold_may_be_none():
     made = wb.from_arrays(
         **GOOD | {"tension_N": (value for value in GOOD["tension_N"])}, **ABOUT, unrecorded_holds=None

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.commands.options import Numbers, numbers, text_of
+from wirebayes.commands.options import Numbers, numbers, one_number, text_of
 from wirebayes.errors import InputError
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.history import with_payload
@@ -133,7 +133,7 @@ def loaded(robot: Robot, payload_kg: float | None, at: Numbers | None) -> Robot:
         if at is not None:
             raise InputError(f"--payload-at: found {text_of(at)} without --payload, expected both")
         return robot
-    mass_kg = float(payload_kg)
+    mass_kg = one_number("--payload", payload_kg, "kilograms, 0 or more")
     if not 0 <= mass_kg < math.inf:
         raise InputError(f"--payload: found {mass_kg:g}, expected kilograms, 0 or more")
     return with_payload(robot, mass_kg, robot.centre_of_mass_m if at is None else numbers("--payload-at", at, 3))

@@ -131,7 +131,7 @@ def batch(
     seed = check_seed(seed)
     train_holds = check_train_holds(train_holds)
     own = path_of(own_effects)
-    left_out = names_given(without)
+    left_out = names_given("without", without)
     catalogue_without(left_out, catalogue(own))
     read, unreadable = _read(sources, catalogue(own), train_holds, keep_going)
     experiments = [experiment for experiment, _ in read]
@@ -172,7 +172,7 @@ def _read(
     sources: Sources, kinds: Kinds, train_holds: int | None, keep_going: bool
 ) -> tuple[list[_WithFile], dict[str, str]]:
     """Every experiment with the file it came from, and what is wrong with the files that cannot be read."""
-    given = [sources] if isinstance(sources, str | os.PathLike | Experiment) else list(sources)
+    given = list(sources) if isinstance(sources, Iterable) and not isinstance(sources, str) else [sources]
     read: list[_WithFile] = []
     wrong: dict[str, str] = {}
     for source in given:

@@ -1,14 +1,13 @@
 """The zero-tension lengths of a robot's wires, from its own readings."""
 
-import math
 import os
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from wirebayes.commands.options import above_zero, check_seed, check_spread, from_zero, path_of
+from wirebayes.commands.options import above_zero, check_seed, check_spread, check_whole, from_zero, path_of
 from wirebayes.commands.wires import (
     RobotLike,
     Wires,
@@ -136,13 +135,10 @@ def calibrate(
     """
     own = path_of(own_effects)
     seed = check_seed(seed)
-    given = _GivenErrors(
-        float(tension_sd), float(tilt_sd), float(reference_sd), anchor_sd, platform_sd, pose_sd, drum_sd, joint_sd
-    )
+    given = _GivenErrors(tension_sd, tilt_sd, reference_sd, anchor_sd, platform_sd, pose_sd, drum_sd, joint_sd)
     specimen_spread = check_spread(specimen_spread)
-    given.check()
-    if not 0 <= next_poses <= _MOST_VISITS:
-        raise InputError(f"--next-poses: found {next_poses}, expected a number from 0 to {_MOST_VISITS}")
+    given = given.checked()
+    check_whole("--next-poses", next_poses, 0, _MOST_VISITS)
     machine = _known_robot(robot)
     bias = _tension_bias(machine, tension_bias)
     session, values, read = _session(readings, machine, given, bias)
@@ -191,10 +187,10 @@ class _GivenErrors:
     drum_percent: float
     joint_mm: float | None
 
-    def check(self) -> None:
-        """Refuse what cannot be a standard error."""
-        above_zero(("--tension-sd", self.tension_N), ("--tilt-sd", self.tilt_rad))
-        from_zero(
+    def checked(self) -> "_GivenErrors":
+        """With errors of readings as Python floats; what cannot be a standard error is refused."""
+        tension_N, tilt_rad = above_zero(("--tension-sd", self.tension_N), ("--tilt-sd", self.tilt_rad))
+        reference_mm, *_ = from_zero(
             ("--reference-sd", self.reference_mm),
             ("--anchor-sd", self.anchor_mm),
             ("--platform-sd", self.platform_mm),
@@ -202,6 +198,7 @@ class _GivenErrors:
             ("--drum-sd", self.drum_percent),
             ("--joint-sd", self.joint_mm or 0.0),
         )
+        return replace(self, tension_N=tension_N, tilt_rad=tilt_rad, reference_mm=reference_mm)
 
     def of_readings(self) -> dict[str, float]:
         """Options that say how well tensions, tilts and references are known."""
@@ -252,9 +249,9 @@ class _GivenErrors:
 
 def _tension_bias(robot: Robot, given: float | None) -> float:
     """Standard deviation of the tension sensors' bias, N: as given, or what the robot's file says."""
-    bias = robot.tension_bias_N if given is None else float(given)
-    if not 0 <= bias < math.inf:
-        raise InputError(f"--tension-bias: found {bias:g}, expected a number of at least 0")
+    if given is None:
+        return robot.tension_bias_N
+    (bias,) = from_zero(("--tension-bias", given))
     return bias
 
 

@@ -175,7 +175,7 @@ def plan_comparison(
     seed = check_seed(seed)
     train_holds = check_train_holds(train_holds)
     own = path_of(own_effects)
-    names = names_given(only)
+    names = names_given("only", only)
     experiments = experiments_of(source, experiment)
     known = catalogue(own)
     base = ModelToCompare(BASE, "", "The plain model.", spec)

@@ -111,7 +111,7 @@ def discover(
     seed = check_seed(seed)
     train_holds = check_train_holds(train_holds)
     own = path_of(own_effects)
-    left_out = names_given(without)
+    left_out = names_given("without", without)
     experiments = experiments_of(source, experiment, train_holds=train_holds, drop_breaks=drop_breaks)
     known = catalogue(own)
     kinds = catalogue_without(left_out, known)

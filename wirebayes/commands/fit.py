@@ -23,7 +23,7 @@ from wirebayes.commands.options import (
 )
 from wirebayes.discovery.model_check import checked_meanwhile, write_checks
 from wirebayes.effects import catalogue, effect_named, source_of
-from wirebayes.errors import InputError
+from wirebayes.errors import InputError, shown
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.next_hold import write_next_holds
@@ -120,7 +120,7 @@ def fit(
     seed = check_seed(seed)
     train_holds = check_train_holds(train_holds)
     own = path_of(own_effects)
-    keys = names_given(effects)
+    keys = names_given("effects", effects)
     if together is not None and experiment is not None:
         raise InputError(f"--together {together}: found --experiment {experiment} beside it, expected one of the two")
     experiments = experiments_of(source, experiment, train_holds=train_holds, drop_breaks=drop_breaks)
@@ -224,6 +224,8 @@ def _groups(experiments: Sequence[Experiment], together: str | None, file: Path)
     """The experiments of each fit, by its folder."""
     if together is None:
         return {experiment.name: (experiment,) for experiment in experiments}
+    if not isinstance(together, str):
+        raise InputError(f"--together: found {shown(together)}, expected a material")
     material = normalize("NFC", together)  # as it is read from files
     members = tuple(experiment for experiment in experiments if experiment.material == material)
     if not members:

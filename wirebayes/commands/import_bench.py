@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeVar, get_args
 
 from wirebayes._version import __version__
-from wirebayes.commands.options import above_zero, check_choice, names_given, without_breaks
+from wirebayes.commands.options import above_zero, check_choice, names_given, one_number, without_breaks
 from wirebayes.errors import InputError
 from wirebayes.io import data_checks, gross_events
 from wirebayes.io.bench.about import About, common_name, default_name
@@ -21,7 +21,7 @@ from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
 from wirebayes.json_files.imported import ImportedExperiment, ImportJson
 from wirebayes.result_warnings import notices_by_part, to_json
 from wirebayes.sentences import listed
-from wirebayes.strict.files import PathLike, read_bytes
+from wirebayes.strict.files import PathLike, given_path, read_bytes
 from wirebayes.views.imported_tests import IMPORTED, ImportedTests
 from wirebayes.views.result import ResultFolder
 from wirebayes.wire.protocol import Control
@@ -123,12 +123,12 @@ def import_bench(
         above_zero(("--area-mm2", area_mm2))
     if isinstance(raw, str) or not isinstance(raw, Sequence):
         raw = [raw]
-    paths = raw_files([Path(path) for path in raw])
+    paths = raw_files([given_path("raw", path) for path in raw])
     names = _names(paths, name, each_file)
     length = float(length_mm)
-    zero = None if zero_mm is None else float(zero_mm)
+    zero = None if zero_mm is None else one_number("--zero-mm", zero_mm, "a displacement in mm")
     area = None if area_mm2 is None else float(area_mm2)
-    said = names_given(mapping)
+    said = names_given("mapping", mapping)
     choices = Choices(said, decimal, time_since, sheet, zero, control, specimens, each_file, drop_breaks)
     is_stated = name is not None
     samples = [About(own, material, length, area, name_is_stated=is_stated) for own in names]

@@ -15,7 +15,7 @@ from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import inverse
-from wirebayes.strict.files import PathLike
+from wirebayes.strict.files import PathLike, given_path
 from wirebayes.strict.xml_file import Element, read_xml
 
 _PARTS = {"bodies_system": "bodies", "links": "bodies", "cables": "cables", "models": "models"}
@@ -65,7 +65,7 @@ def import_robot(
     6
     """
     names = [files] if isinstance(files, str) or not isinstance(files, Sequence) else list(files)
-    found = _read([Path(name) for name in names], cable_set, pulleys)
+    found = _read([given_path("files", name) for name in names], cable_set, pulleys)
     bounds = found.tension_N if tension is None else tuple(numbers("--tension", tension, 2).tolist())
     where = found.home_m if position is None else numbers("--position", position, 3)
     first = names[0]
@@ -78,7 +78,7 @@ def import_robot(
     lowest, highest = bounds
     if not 0 <= lowest < highest:
         raise InputError(f"--tension: found {lowest:g},{highest:g}, expected 0 <= LOWEST < HIGHEST in newtons")
-    target = Path(output)
+    target = given_path("output", output)
     if target.exists():
         raise InputError(f"{target}: found a file of this name, expected none; nothing is overwritten")
     text = robot_file(found, (lowest, highest), np.asarray(where))

@@ -9,7 +9,7 @@ from wirebayes.commands.options import path_of
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import COMPLETE, CONFIGURATION, read_json
 from wirebayes.json_files.summary import SummaryJson
-from wirebayes.strict.files import PathLike
+from wirebayes.strict.files import PathLike, given_path
 from wirebayes.views.batch import Batch
 from wirebayes.views.calibration import Calibration
 from wirebayes.views.check import Check
@@ -65,7 +65,7 @@ def load(folder: PathLike, *, own_effects: PathLike | None = None) -> Any:
     >>> wb.load(folder)
     Posterior(kite-1.5m, chain hooke saturating, converged)
     """
-    place = ResultFolder(Path(folder))
+    place = ResultFolder(given_path("folder", folder))
     own = path_of(own_effects)
     path = place.path
     if (path / POSTERIOR).is_file():

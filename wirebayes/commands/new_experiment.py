@@ -5,7 +5,7 @@ from pathlib import Path
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import check_links, write_text
 from wirebayes.io.start import CSV, NAME, TOML
-from wirebayes.strict.files import PathLike
+from wirebayes.strict.files import PathLike, given_path
 
 
 def new_experiment(folder: PathLike) -> Path:
@@ -36,7 +36,7 @@ def new_experiment(folder: PathLike) -> Path:
     >>> wb.read_experiments(file)[0].tension().shape
     (8, 5)
     """
-    target = Path(folder)
+    target = given_path("folder", folder)
     toml = target / f"{NAME}.toml"
     readings = target / f"{NAME}.csv"
     contents = {readings: CSV, toml: TOML}

@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from wirebayes.errors import InputError
+from wirebayes.errors import InputError, shown
 from wirebayes.inference.policy import Policy
 from wirebayes.io import gross_events
 from wirebayes.io.experiment import ENOUGH, Experiment, enough, folder_key, holds_and_readings
@@ -16,7 +16,7 @@ from wirebayes.model.build import build
 from wirebayes.model.prior_names import check_prior_names
 from wirebayes.model.sample import Likelihood
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
-from wirebayes.strict.files import PathLike
+from wirebayes.strict.files import PathLike, given_path
 from wirebayes.strict.hint import hint
 from wirebayes.wire.effect import Effect, Kinds
 from wirebayes.wire.laws import ElasticLaw, History
@@ -27,14 +27,34 @@ Numbers = (
 )  # text is what the command line was given: it stands in the configuration
 
 
-def path_of(value: PathLike | None) -> Path | None:
+def path_of(value: PathLike | None, option: str = "own_effects") -> Path | None:
     """A path, where there is one."""
-    return None if value is None else Path(value)
+    return None if value is None else given_path(option, value)
 
 
-def names_given(value: str | Iterable[str] | None) -> tuple[str, ...]:
-    """Names, of which one may stand alone."""
-    return (value,) if isinstance(value, str) else tuple(value or ())
+def names_given(option: str, value: str | Iterable[str] | None) -> tuple[str, ...]:
+    """Names, of which one may stand alone.
+
+    Parameters
+    ----------
+    option : str
+        Its name, for the message.
+    value : str, or iterable of str, or None
+
+    Raises
+    ------
+    InputError
+        Something among them is no text.
+    """
+    if value is None:
+        return ()
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        value = (value,)
+    names = tuple(value)
+    for name in names:
+        if not isinstance(name, str):
+            raise InputError(f"{option}: found {shown(name)}, expected a name or several")
+    return names
 
 
 def experiments_of(
@@ -140,7 +160,7 @@ def check_seed(seed: int) -> int:
     return check_whole("seed", seed, 0)
 
 
-def check_whole(option: str, value: int, least: int) -> int:
+def check_whole(option: str, value: int, least: int, most: float = float("inf")) -> int:
     """A whole number as a Python integer.
 
     Parameters
@@ -149,9 +169,12 @@ def check_whole(option: str, value: int, least: int) -> int:
         Its name, for the message.
     value, least : int
         What was given, and the smallest that it may be.
+    most : number
+        The largest.
     """
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise InputError(f"{option}: found {value!r}, expected a whole number, {least} or more")
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
+        allowed = f", {least} or more" if most == float("inf") else f" from {least} to {most}"
+        raise InputError(f"{option}: found {value!r}, expected a whole number{allowed}")
     return int(value)
 
 
@@ -262,22 +285,52 @@ def rising_times(values: Numbers) -> Any:
 
 def check_spread(value: float, *, alike: bool = True) -> float:
     """A relative difference between specimens, below 1; above 0 where they may not be `alike`."""
-    value = float(value)
+    expected = f"a number {'from 0' if alike else 'above 0'} and below 1, 0.05 for 5 %"
+    value = one_number("--specimen-spread", value, expected)
     if not 0.0 <= value < 1.0 or (value == 0.0 and not alike):
-        above = "from 0" if alike else "above 0"
-        raise InputError(f"--specimen-spread: found {value:g}, expected a number {above} and below 1, 0.05 for 5 %")
+        raise InputError(f"--specimen-spread: found {value:g}, expected {expected}")
     return value
 
 
-def above_zero(*options: tuple[str, float]) -> None:
-    """Refuse what is not a finite number above zero."""
-    for name, value in options:
+def one_number(option: str, value: float, expected: str) -> float:
+    """A number as a Python float, finite or not.
+
+    Parameters
+    ----------
+    option : str
+        Its name, for the message.
+    value : float
+    expected : str
+        What it may be, for the message.
+
+    Raises
+    ------
+    InputError
+        It is no number.
+    """
+    try:
+        if not isinstance(value, str | bool):
+            return float(value)
+    except (TypeError, ValueError):
+        pass
+    raise InputError(f"{option}: found {shown(value)}, expected {expected}")
+
+
+def above_zero(*options: tuple[str, float]) -> list[float]:
+    """The values as Python floats; what is not a finite number above zero is refused."""
+    expected = "a finite number above 0"
+    values = [one_number(name, value, expected) for name, value in options]
+    for (name, _), value in zip(options, values, strict=True):
         if not 0 < value < float("inf"):
-            raise InputError(f"{name}: found {value:g}, expected a finite number above 0")
+            raise InputError(f"{name}: found {value:g}, expected {expected}")
+    return values
 
 
-def from_zero(*options: tuple[str, float]) -> None:
-    """Refuse what is not a finite number of at least zero."""
-    for name, value in options:
+def from_zero(*options: tuple[str, float]) -> list[float]:
+    """The values as Python floats; what is not a finite number of at least zero is refused."""
+    expected = "a finite number of at least 0"
+    values = [one_number(name, value, expected) for name, value in options]
+    for (name, _), value in zip(options, values, strict=True):
         if not 0 <= value < float("inf"):
-            raise InputError(f"{name}: found {value:g}, expected a finite number of at least 0")
+            raise InputError(f"{name}: found {value:g}, expected {expected}")
+    return values

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.random import Generator
 
 from wirebayes._version import __version__
-from wirebayes.commands.options import above_zero, check_priors, check_seed, model_spec, path_of
+from wirebayes.commands.options import above_zero, check_priors, check_seed, model_spec, names_given, path_of
 from wirebayes.commands.plan_content import PlanRequest, plan_content, protocol_content
 from wirebayes.commands.predict import find_posterior
 from wirebayes.commands.wires import RobotLike, hash_of, identity_of, robot_of
@@ -337,7 +337,7 @@ def _hold(sample: Sample, row: int) -> Hold:
 
 
 def _checked_aim(aim: Aim, effects: list[str]) -> tuple[str, ...]:
-    words = (aim,) if isinstance(aim, str) else tuple(aim)
+    words = names_given("--aim", aim)
     if words in (("parameters",), ("creep",)):
         return words
     are_two = len(words) == 2 and words[0] != words[1]

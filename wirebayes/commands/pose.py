@@ -173,8 +173,7 @@ def pose(
     given = _Given(robot, wires, draws, experiment, path_of(own_effects), check_seed(seed), output, progress)
     bare = robot_of(robot)
     machine = loaded(bare, payload, payload_at)
-    allowed = _Allowed(rising_times(times), float(tolerance), float(tolerance_tilt))
-    allowed.check()
+    allowed = _Allowed.of(times, tolerance, tolerance_tilt)
     specimen_spread = check_spread(specimen_spread, alike=False)
     asked = given.asked(machine, position, rotation, payload)
     specimen_spread = typical_spread(asked.line, specimen_spread)
@@ -263,9 +262,11 @@ class _Allowed:
     distance_mm: float
     tilt_deg: float
 
-    def check(self) -> None:
-        """Refuse what allows nothing."""
-        above_zero(*self.options().items())
+    @classmethod
+    def of(cls, times: Numbers, tolerance: float, tolerance_tilt: float) -> "_Allowed":
+        """What was asked for; what allows nothing is refused."""
+        moments = rising_times(times)
+        return cls(moments, *above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt)))
 
     def options(self) -> dict[str, float]:
         """As the command's options have it."""

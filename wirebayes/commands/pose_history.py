@@ -9,7 +9,7 @@ import numpy as np
 
 from wirebayes.commands.asked_pose import OFF_PLANE, AskedPose
 from wirebayes.commands.calibrate import calibrated_of
-from wirebayes.commands.options import above_zero
+from wirebayes.commands.options import above_zero, one_number
 from wirebayes.commands.wires import Wires, content_hash, hash_of
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, write_csv, write_json
@@ -56,10 +56,8 @@ def checked_errors(reference_sd: float, specimen_spread: float, tension_sd: floa
     InputError
         If one is not a number that it can be.
     """
-    reference_sd = float(reference_sd)
-    tension_sd = float(tension_sd)
-    tilt_sd = float(tilt_sd)
-    above_zero(("--tension-sd", tension_sd), ("--tilt-sd", tilt_sd))
+    reference_sd = one_number("--reference-sd", reference_sd, "millimetres, 0 or more")
+    tension_sd, tilt_sd = above_zero(("--tension-sd", tension_sd), ("--tilt-sd", tilt_sd))
     if not 0 <= reference_sd < np.inf:
         raise InputError(f"--reference-sd: found {reference_sd:g}, expected millimetres, 0 or more")
     return Uncertain(1e-3 * reference_sd, float(specimen_spread), tension_sd, tilt_sd)

@@ -98,11 +98,12 @@ def predict(
     cells = _cells(protocol, control)
     requests = [(probability, request_of(cells, stored, fresh=fresh)) for probability, stored in members]
     seed = check_seed(seed)
-    if output is not None:
-        _check_output(Path(output), protocol)
+    file = path_of(output, "output")
+    if file is not None:
+        _check_output(file, protocol)
     rows = mixture_table(requests, seed)
-    if output is not None:
-        write_csv(Path(output), header(control), rows)
+    if file is not None:
+        write_csv(file, header(control), rows)
     doubts = [doubt for _, stored in members for doubt in stored.doubts]
     doubts += beyond_tested(rows, first)
     doubts += unlikely_readings(requests, seed)

@@ -1,12 +1,10 @@
 """The paper, with posteriors."""
 
-from pathlib import Path
-
 from wirebayes.commands.options import check_seed
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.processes.workers import computing
 from wirebayes.progress import Progress, silent
-from wirebayes.strict.files import PathLike
+from wirebayes.strict.files import PathLike, given_path
 from wirebayes.views.reproduction import Reproduction
 from wirebayes.views.result import ResultFolder
 
@@ -43,7 +41,7 @@ def reproduce_paper(
     """
     from wirebayes.paper.run import reproduce  # matplotlib only where it is needed
 
-    place = ResultFolder(Path(output))
+    place = ResultFolder(given_path("output", output))
     with computing():
         lines = reproduce(place.path, check_seed(seed), progress or silent, policy or DEFAULT)
     return Reproduction(place, not_converged=tuple(lines))

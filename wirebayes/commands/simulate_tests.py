@@ -12,13 +12,14 @@ from wirebayes.commands.options import (
     check_history,
     check_seed,
     check_whole,
+    from_zero,
     model_spec,
     names_given,
     path_of,
     text_of,
 )
 from wirebayes.effects import catalogue, source_of
-from wirebayes.errors import InputError
+from wirebayes.errors import InputError, shown
 from wirebayes.io.experiment_file import SHORTEST
 from wirebayes.io.run_folder import check_run, open_run
 from wirebayes.simulation.stated_truth import effect_option, finite_number, without_trace
@@ -119,11 +120,12 @@ def simulate_tests(
     tests = check_whole("--tests", tests, 1)
     sizes = _numbers("--lengths", lengths)
     moments = _numbers("--times", times)
-    control, path = _settings(displacements, weights, unload)
+    control, path = _settings(displacements, weights, check_whole("--unload", unload, 0))
     gaps = frozenset(unrecorded)
     _check_protocol(control, path, sizes, moments, gaps)
     _check_effects(found, history, path, gaps)
     warmth = _temperatures(temperature)
+    from_zero(("--resolution", resolution))
     alike = Bench(times_s=moments, unrecorded=gaps, temperatures_C=warmth).setting(control, path, float(resolution))
     benches = _benches(alike, tests, sizes)
     truth = Truth(chosen, tuple(found.values()), spec.law, spec.history)
@@ -172,6 +174,8 @@ def _check_truth(benches: Sequence[Bench], truth: Truth, seed: int) -> None:
 
 
 def _parameters(given: Mapping[str, float]) -> dict[str, float]:
+    if not isinstance(given, Mapping):
+        raise InputError(f"parameters: found {shown(given)}, expected values by name")
     return {name: finite_number(f"--parameter {name}={value}", str(value)) for name, value in given.items()}
 
 
@@ -181,7 +185,7 @@ def _effects(
     """The effects by key, and the amplitudes that were given."""
     if isinstance(effects, Mapping):
         effects = [f"{key}={value}" for key, value in effects.items()]
-    texts = names_given(effects)
+    texts = names_given("effects", effects)
     found: dict[str, Effect] = {}
     given: dict[str, float] = {}
     known = catalogue(own)

@@ -11,6 +11,7 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from wirebayes._version import __version__
+from wirebayes.commands.options import check_whole
 from wirebayes.commands.predict import one_of
 from wirebayes.commands.wire_draws import draws_of_specimens, read_wires, usable_draws
 from wirebayes.effects import source_of
@@ -20,7 +21,7 @@ from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, lines_of, stated_line
 from wirebayes.robot.motion.hanging import at_home
-from wirebayes.strict.files import PathLike
+from wirebayes.strict.files import PathLike, given_path
 from wirebayes.views.findings import Findings
 from wirebayes.views.posterior import POSTERIOR, Posterior, Posteriors
 
@@ -53,7 +54,7 @@ def read_robot(name_or_file: PathLike) -> Robot:
     >>> robot.legs, robot.degrees
     (7, 6)
     """
-    return schema.read_robot_file(os.fspath(name_or_file))
+    return schema.read_robot_file(str(given_path("robot", name_or_file)))
 
 
 def robot_of(robot: RobotLike) -> Robot:
@@ -172,6 +173,7 @@ def draws_for(
     InputError
         If there is no posterior, or the lines and the robot's legs do not fit together.
     """
+    count = check_whole("--draws", count, 1)
     line = stated_line(robot, count) if wires is None else draws_of(wires, count, experiment, own_effects)
     lines_of(robot, line)
     idle = [name for name in line.each if name not in robot.wire]

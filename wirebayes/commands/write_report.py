@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from wirebayes.strict.files import PathLike
+from wirebayes.commands.options import path_of
+from wirebayes.strict.files import PathLike, given_path
 from wirebayes.views.result import Result
 
 
@@ -35,5 +36,5 @@ def write_report(folder: PathLike | Result[Any], *, output: PathLike | None = No
     """
     from wirebayes.report.page import write_page  # matplotlib only where it is needed
 
-    results = folder.place.path if isinstance(folder, Result) else Path(folder)
-    return write_page(results, None if output is None else Path(output))
+    results = folder.place.path if isinstance(folder, Result) else given_path("folder", folder)
+    return write_page(results, path_of(output, "output"))

@@ -102,16 +102,24 @@ def from_arrays(
         about["resolution_mm"] = resolution_mm
     if preload_mm is not None:
         about["preload_mm"] = preload_mm
-    if unrecorded_holds is not None and len(unrecorded_holds):
-        about["unrecorded_holds"] = [dict(each) for each in unrecorded_holds]
+    if unrecorded_holds is not None:
+        about["unrecorded_holds"] = _tables(unrecorded_holds)
     experiment_name = name if isinstance(name, str) else ""
     keys = _Arguments(SOURCE, "", None, _plain(about), experiment_name)
-    empty = (READ.get(control, ""), "temperature_C")
+    read = READ.get(control, "") if isinstance(control, str) else ""
+    empty = (read, "temperature_C")
 
     def readings() -> CsvTable:
         return table_of(columns, SOURCE, REQUIRED, OPTIONAL, may_be_empty=empty)
 
     return experiment_of(keys, readings)
+
+
+def _tables(given: Any) -> Any:
+    """Mappings as the tables that a file would have; what is no list, or in it no mapping, as it is, to be refused."""
+    if isinstance(given, str | Mapping) or not isinstance(given, Iterable):
+        return given
+    return [dict(each) if isinstance(each, Mapping) else each for each in given]
 
 
 def _stated(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -155,7 +163,8 @@ class _Arguments(Keys):
     """Arguments of a call in place of the keys of a file."""
 
     def complain(self, key: str, found: str, expected: str) -> InputError:
-        place = f", argument {self.prefix}{key}" if self.prefix or key in self.table or found == "nothing" else ""
+        given = key.partition("[")[0] in self.table
+        place = f", argument {self.prefix}{key}" if self.prefix or given or found == "nothing" else ""
         return InputError(f"{self.source}{place}: found {found}, expected {expected}")
 
 

@@ -14,7 +14,7 @@ from wirebayes.io import mistaken_table
 from wirebayes.io.experiment import ENOUGH, Experiment, enough, folder_key, holds_and_readings, in_sequence
 from wirebayes.io.readings import HANGS_FREE, READ, SET, STRETCH, Hold, checked_readings, readings_table
 from wirebayes.numeric.frozen import frozen
-from wirebayes.strict.files import read_text
+from wirebayes.strict.files import given_path, read_text
 from wirebayes.strict.hint import hint
 from wirebayes.strict.table import LARGEST, CsvTable
 from wirebayes.strict.toml_keys import Keys
@@ -87,7 +87,7 @@ def read_experiments(path: str | Path) -> list[Experiment]:
     >>> [test.name for test in wb.read_experiments("experiments.toml")]
     ['roc-line-1m', 'roc-line-1.71m', 'nylon-1.5m', 'kite-1.5m']
     """
-    source = Path(path)
+    source = given_path("path", path)
     try:
         text = read_text(source, "TOML with at least one [[experiment]]")
         top = Keys.of_file(source, text)

@@ -7,10 +7,29 @@ import re
 import stat
 from pathlib import Path
 
-from wirebayes.errors import InputError
+from wirebayes.errors import InputError, shown
 
 PathLike = str | os.PathLike[str]
 _NEWLINE = re.compile(r"\r\n|\n|\r")
+
+
+def given_path(name: str, value: PathLike) -> Path:
+    """The path that an argument gives.
+
+    Parameters
+    ----------
+    name : str
+        Of the argument, for the message.
+    value : path
+
+    Raises
+    ------
+    InputError
+        It is no path.
+    """
+    if not isinstance(value, str | os.PathLike):
+        raise InputError(f"{name}: found {shown(value)}, expected a path")
+    return Path(value)
 
 
 def read_bytes(path: Path) -> bytes:
