@@ -223,6 +223,9 @@ def test_effects_lists_the_catalogue_and_describes_one(capsys: pytest.CaptureFix
     assert main(["effects"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == list(CATALOGUE)
+    for name in CATALOGUE:  # as the list has it, also where a model needs a hold or a parameter: grip_slip@7
+        assert main(["effects", name]) == 0
+        assert capsys.readouterr().out.splitlines()[0] == name
     assert main(["effects", "strain_stiffening"]) == 0
     shown = capsys.readouterr().out
     assert "k1 s (1 + c s)" in shown and "strain_stiffening.c in 1, neutral value 0" in shown

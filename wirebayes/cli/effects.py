@@ -27,10 +27,10 @@ def effects_command(name: Name = None, output: Kept = None, seed: Seed = 0, own_
     if name is None:
         lines = _listed(known)
     else:
-        # an unknown name is refused, with those that there are
-        wanted = effect_named(name, catalogue(own_effects)).name
-        (effect,) = [e for e in known if e.name == wanted]
-        lines = _described(effect)
+        by_name = {effect.name: effect for effect in known}
+        # an effect of one hold, or of one parameter, has its name in the list; an unknown name is refused
+        wanted = name if name in by_name else effect_named(name, catalogue(own_effects)).name
+        lines = _described(by_name[wanted])
     text = "\n".join(lines)
     if output is not None:
         with writable(output):
