@@ -191,7 +191,7 @@ BAD_TOML = [
     ('"wire-a"', '"wire.svg"', "key name: found 'wire.svg'", "not one that results have for themselves"),
     ('"wire-a"', '".lock"', "key name: found '.lock', expected a name of letters"),
     ('"wire-a"', '"configuration.json"', "key name: found 'configuration.json', expected a name of letters"),
-    ('"wire-a"', '"' + "w" * 101 + '"', "key name: found 'www"),
+    ('"wire-a"', '"' + "w" * 101 + '"', "key name: found 'www", "at most 100"),
     ('"wire-a"', "7", "key name: found 7"),
     ('"Roc Line 2.2 kg"', '"../up"', "key material: found '../up'"),
     ('"Roc Line 2.2 kg"', '" "', "key material: found ' '"),

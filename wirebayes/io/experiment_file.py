@@ -154,7 +154,7 @@ def experiment_of(keys: Keys, readings: Callable[[], CsvTable]) -> Experiment:
     ------
     InputError
     """
-    expected = "a name of letters, digits, '.', '_' and '-' for a folder of results"
+    expected = "a name of letters, digits, '.', '_' and '-', at most 100, for a folder of results"
     name = keys.string("name", expected)
     if not _NAME.fullmatch(name):
         raise keys.complain("name", shown(name), expected)
