@@ -1,9 +1,12 @@
-"""What is likely missing beside what was named, and not established: the final model does without it."""
+"""What may be missing beside what was named: what is likely and not established, or samples that differ."""
+
+from collections.abc import Sequence
 
 from wirebayes.discovery.settings import REMAINS
 from wirebayes.json_files.discovery import SharedFindings
 from wirebayes.result_warnings import Notice
 
+_UNNAMED = ("unknown", "partial")
 _LACKING = ("named", "ambiguous")  # of the other verdicts the final model has a discrepancy, or nothing is missing
 
 
@@ -35,3 +38,22 @@ def likely_beside(found: SharedFindings) -> list[Notice]:
         "intervals and predictions can be wrong by more than they say"
     )
     return [Notice("incomplete", text)]
+
+
+def samples_may_differ(found: SharedFindings, samples: Sequence[str]) -> list[Notice]:
+    """A notice that what has no name may be a difference between samples, which a search takes to be alike.
+
+    Parameters
+    ----------
+    found : dict
+        Of one experiment, as in ``discovery.json``.
+    samples : sequence of str
+        Those of its material.
+    """
+    if found["verdict"] not in _UNNAMED or len(samples) == 1:
+        return []
+    text = (
+        f"what has no name may be that the {len(samples)} samples differ: k1, B, U, k2 and N are taken to be those of "
+        f"one line in all of them; search each by itself (--experiment {samples[0]})"
+    )
+    return [Notice("left-out", text)]

@@ -20,7 +20,7 @@ from wirebayes.discovery.global_test import Gate, examine
 from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.investigation import Concluded, Investigation
 from wirebayes.discovery.judgement import Evidence, FamilyEvidence
-from wirebayes.discovery.likely_beside import likely_beside
+from wirebayes.discovery.likely_beside import likely_beside, samples_may_differ
 from wirebayes.discovery.material_answer import MaterialAnswer, answer_material
 from wirebayes.discovery.model_space import largest_first
 from wirebayes.discovery.naming import Named, name_effects
@@ -121,9 +121,7 @@ def investigate(
         own = _own_reports(gate, i, answer, left_out, rng, parallel_map)
         for e in gate.blocks[i].experiments:
             common = _common(answers, i, e, gate.blocks, gate.test, where[i], alike)
-            beside = likely_beside(common)
-            warnings = to_json([*beside, *from_json(own[e.name]["warnings"])])
-            out[e.name] = {**common, **ahead, **own[e.name], "warnings": warnings}
+            out[e.name] = _with_doubts({**common, **ahead, **own[e.name]}, gate.blocks[i].names)
     report("held-out holds", len(answers), len(answers))
     return Investigation(
         models.final,
@@ -194,6 +192,13 @@ def _own_reports(
         }
         reports[e.name] = in_unit(own, READ_UNIT[e.control])
     return reports
+
+
+def _with_doubts(found: ExperimentFindings, samples: Sequence[str]) -> ExperimentFindings:
+    """What is said of an experiment, and among its warnings what the final model lacks or takes to be alike."""
+    doubts = [*likely_beside(found), *samples_may_differ(found, samples)]
+    found["warnings"] = to_json([*doubts, *from_json(found["warnings"])])
+    return found
 
 
 def _few_holds(experiment: Experiment) -> list[Notice]:
