@@ -10,6 +10,7 @@ from wirebayes.inference.policy import Policy
 from wirebayes.io.checked_test import CheckedTest
 from wirebayes.io.data_checks import COPIED_TEST, copied_tests
 from wirebayes.io.experiment import Experiment
+from wirebayes.io.run_folder import read_json
 
 FEW = Policy(walkers=32, ess=300, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
 
@@ -34,6 +35,15 @@ def test_a_copy_is_warned_of_where_both_are_judged_together(twice: list[Experime
     assert not [w for w in said["wire"] if "once more" in w["text"]]
     text = str(fitted.summary())
     assert "copy: its readings are those of experiment wire once more" in text
+
+
+def test_a_copy_among_specimens_is_warned_of(twice: list[Experiment], tmp_path) -> None:
+    """Each is fitted by itself, and the scatter of a material's specimens is judged by all of them."""
+    wb.batch(twice, discover=False, check=False, policy=FEW, output=tmp_path / "batch")
+    rows = {row["name"]: row for row in read_json(tmp_path / "batch" / "batch.json")["experiments"]}
+    said = {name: [w["text"] for w in row["warnings"] if "once more" in w["text"]] for name, row in rows.items()}
+    assert said["wire"] == [] and len(said["copy"]) == 1 and "compared together they count twice" in said["copy"][0]
+    assert "experiment wire once more" in (tmp_path / "batch" / "summary.csv").read_text()
 
 
 def test_other_readings_of_the_same_settings_are_no_copy(twice: list[Experiment]) -> None:

@@ -28,6 +28,8 @@ from wirebayes.discovery.settings import SIMULATIONS
 from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
 from wirebayes.inference.policy import DEFAULT, Policy
+from wirebayes.io.checked_test import CheckedTest
+from wirebayes.io.data_checks import copied_tests
 from wirebayes.io.experiment import Experiment, folder_key
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.run_folder import check_run, open_run, read_json, write_bytes, write_csv, write_json, write_parquet
@@ -161,11 +163,23 @@ def batch(
     with computing():
         _compute(read, task, path, configuration, scheduler, progress or silent)
     with open_run(path, configuration) as run:
-        rows: list[Row] = [read_json(path / experiment.name / _ROW) for experiment in experiments]
+        rows = _rows(experiments, path)
         rows += [_empty(file, error) for file, error in unreadable.items()]
         _tabulate(rows, outliers(rows), path)
         run.finish()
     return Batch(place, own)
+
+
+def _rows(experiments: Sequence[Experiment], folder: Path) -> list[Row]:
+    """The row of each experiment, with what is said of readings that another one has, too."""
+    tests = {e.name: CheckedTest(e.protocol(), e.readings(), e.resolution) for e in experiments}
+    copied = copied_tests(tests)
+    rows = []
+    for experiment in experiments:
+        row: Row = read_json(folder / experiment.name / _ROW)
+        row["warnings"] = to_json([*copied.get(experiment.name, ()), *from_json(row["warnings"])])
+        rows.append(row)
+    return rows
 
 
 def _read(

@@ -82,7 +82,7 @@ def of_experiment(experiment: Experiment) -> list[Notice]:
 def copied_tests(tests: Mapping[str, CheckedTest]) -> dict[str, list[Notice]]:
     """What is said of each of several tests, by name, whose settings and readings are those of an earlier one.
 
-    Judged together, they count twice.
+    Judged or compared together, they count twice.
     """
     names: dict[tuple[bytes, bytes], str] = {}
     found: dict[str, list[Notice]] = {}
@@ -92,8 +92,8 @@ def copied_tests(tests: Mapping[str, CheckedTest]) -> dict[str, list[Notice]]:
         first = names.setdefault((settings.tobytes(), read.tobytes()), name)
         if first != name and np.unique(read).size >= COPIED_TEST:
             text = (
-                f"its readings are those of experiment {first} once more: judged together they count twice, and "
-                "intervals are too narrow; leave one of the two out"
+                f"its readings are those of experiment {first} once more: judged or compared together they count "
+                "twice, and what is said of both is surer than it may be; leave one of the two out"
             )
             found[name] = [Notice("data", text)]
     return found
