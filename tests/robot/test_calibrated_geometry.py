@@ -1,13 +1,24 @@
 """A history on a robot whose anchors were calibrated: as certain as the calibration, which knows sums best."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
+from tests.robot.test_history import _line
 from tests.robot.test_measured_poses import OPPOSED, PLACE_MM, PLACES, _calibrated, _log, _rests
 from wirebayes.cli import main
+from wirebayes.robot.history.estimate import estimate_poses
+from wirebayes.robot.history.history import History
+from wirebayes.robot.history.live import LiveEstimator
+from wirebayes.robot.history.unknowns import Uncertain, unknowns
+from wirebayes.robot.mechanics import schema
+from wirebayes.robot.mechanics.draws import for_robot
+from wirebayes.robot.motion import forward, inverse
+from wirebayes.robot.self_calibration.calibrated import Calibrated
+from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
 PLANE = [0, 2]  # x and z
 STOPS = np.arange(0, 24, 5)
@@ -66,3 +77,61 @@ def test_tensions_do_not_make_a_calibrated_robot_more_certain_than_its_points_ar
     here, sd = _followed(folder, fitted, header, _twice(joint, tension), "--tension-sd", "0.01")
     off = (here - places) / sd
     assert np.sqrt(np.mean(off**2)) < 2
+
+
+@pytest.fixture(scope="module")
+def far():
+    """A calibration whose references make up for its points where its session was, and a history far from there."""
+    robot, line, rng = schema.read_robot_file("hangprinter-4"), _line(24), np.random.default_rng(3)
+    here = robot.home_m[None], np.eye(3)[None]
+    there = robot.home_m + 0.1 * robot.span_m * np.array([1.0, -0.5, 0.3])
+    both = np.stack([robot.home_m, there]), np.tile(np.eye(3), (2, 1, 1))
+    tau = inverse.tensions(robot, *both)
+    wires = for_robot(robot, line.centre())
+    joint = inverse.commands(robot, wires, *both, tau).joint_m
+    session = Session(*here, joint[:1], np.array([1e-6]), np.zeros(1, bool), np.nan)
+    prior = LengthPrior(line, 1e-3, 1e-4)
+    mean, covariance = prior.moments(robot.legs)
+    legs, d = robot.legs, len(mean)
+    points = 5e-3 * rng.standard_normal((40, 3 * legs))
+    none = np.append(mean, np.zeros(3 * legs))
+    nothing = Calibrated(robot, prior, session, none, np.eye(len(none)), tau[:1], ("exit",))
+    lengths = -nothing.error_m(np.concatenate([np.zeros((40, d)), points], 1), here, tau[:1])[0]
+    together = np.cov(np.concatenate([lengths, points], 1).T) + 1e-12 * np.eye(4 * legs)
+    whole = np.zeros((d + 3 * legs, d + 3 * legs))
+    whole[:d, :d] = covariance
+    own = np.r_[0:legs, d : d + 3 * legs]
+    whole[np.ix_(own, own)] = together
+    known = replace(nothing, covariance=whole)
+    times = np.array([0.0, 1e-3])
+    history = History(times, np.stack([joint[1], joint[1]]), None, None, np.zeros(2), np.zeros((2, 3)))
+    return robot, line, history, Uncertain(calibrated=known), (there, np.eye(3))
+
+
+def test_each_draw_of_a_history_has_its_own_points(far):
+    """Away from the session, points that are off no longer make up for the references."""
+    robot, line, history, errors, near = far
+    found = estimate_poses(robot, line, history, near, errors, np.random.default_rng(0)).track.position_m[:, 0]
+    known = unknowns(robot, line, errors, np.random.default_rng(0))
+    white = known.draws
+    values = known.mean + white @ known.root.T
+    wires, reference = known.columns(white)
+    strain = known.carried(white).strain(wires).T
+    bare, offset = inverse.lengths(robot, history.joint_m[:1])
+    real = []
+    for n, row in enumerate(values):
+        own = replace(robot, exit_m=robot.exit_m + row[-3 * robot.legs :].reshape(-1, 3))
+        zero = (bare + reference[n]) * (1 + strain[n])
+        real.append(forward.solve_equilibrium(own, wires.part([n]), zero, offset, *near).position_m[0])
+    real = np.array(real)
+    assert real.std(0).max() > 5e-4
+    assert np.abs(found - real).max() < 0.1 * real.std(0).max()
+
+
+def test_a_running_estimate_has_them_too(far):
+    robot, line, history, errors, near = far
+    batch = estimate_poses(robot, line, history, near, errors, np.random.default_rng(0)).track.position_m[:, 0]
+    for reads in (False, True):
+        now = LiveEstimator(robot, line, errors, near, reads).step(0.0, history.joint_m[0])
+        np.testing.assert_allclose(now.position_m, batch.mean(0), atol=0.05 * batch.std(0).max())
+        np.testing.assert_allclose(now.position_sd_m, batch.std(0), rtol=0.05)

@@ -110,8 +110,8 @@ class CalibratedUnknowns(TypedDict):
     """The posterior that ``pose --calibration`` starts from.
 
     `mean` and `covariance` are of the reference errors of all wires (m), the line's parameters (`line` names them;
-    logarithms of those that are positive) and the logarithmic deviations of every wire's own parameters. Errors of
-    points are among those of the lengths; by `by_pose_mm` they differ from pose to pose.
+    logarithms of those that are positive) and the logarithmic deviations of every wire's own parameters; then how far
+    the `points` of all legs that were estimated are from where they were found (m).
     """
 
     version: int
@@ -120,7 +120,8 @@ class CalibratedUnknowns(TypedDict):
     line: list[str]
     mean: Numbers
     covariance: Numbers
-    by_pose_mm: Numbers
+    points: list[str]
+    pull_N: Numbers
     session: SessionDone
 
 

@@ -155,18 +155,20 @@ class _Asked:
             found, joint_m = commanded.drift_along(robot, line, history, self.errors, rng, progress)
             return found, joint_m, self._commanded_again
         found = estimate_poses(robot, line, history, self.near, self.errors, rng, progress)
-        return found, history.joint_m, partial(self._measured_again, history.joint_m, found.starts_s)
+        return found, history.joint_m, partial(self._measured_again, history.joint_m, found)
 
     def _measured_again(
-        self, joint_m: Floats, starts_s: Floats, few: WireDraws, restart: float, stated: History | None = None
+        self, joint_m: Floats, found: Estimate, few: WireDraws, restart: float, stated: History | None = None
     ) -> Track:
         """With few draws, the same each time, whose clocks start at every hold; once where `restart` is infinite."""
         known = unknowns(self.robot, few, _alike(self.errors), np.random.default_rng(self.seed))
+        starts_s = found.starts_s
         if stated is not None:
             starts_s = stated_starts(stated)
         elif np.isinf(restart):
             starts_s = starts_s[:1]
-        wires, error_m = known.columns(known.draws)
+        wires, _ = known.columns(known.draws)
+        error_m = known.lengths_along(known.draws, found.plain)
         carried = known.carried(known.draws)
         return follow_log(self.robot, wires, self.history, joint_m, self.near, starts_s, error_m, carried=carried)
 

@@ -63,10 +63,12 @@ def drift_along(
     exact = replace(errors, reference_m=0.0)
     known = unknowns(robot, line, exact, rng)
     wires, error = known.columns(known.draws)
+    tau = _held_tensions(robot, fine)
     if errors.calibrated is None:
         error = np.zeros_like(error)  # of lengths that nobody measured nothing but creep is followed
+    else:
+        error = known.lengths_along(known.draws, _without_drift(fine, tau, np.zeros(len(tau), int)))
     carried = known.carried(known.draws)
-    tau = _held_tensions(robot, fine)
     strain = carried.strain(wires)
     joint = _commanded_joints(robot, fine, wires, tau, strain, error)
     starts = clock_starts(fine, tau, restart)
@@ -77,7 +79,7 @@ def drift_along(
 
     track = follow_log(robot, wires, fine, joint, start, starts, error, watched, carried)
     plain = _without_drift(fine, tau, track.hold)
-    found = Estimate(track.at_rows(kept), plain.at_rows(kept), wires, error, starts)
+    found = Estimate(track.at_rows(kept), plain.at_rows(kept), wires, error[kept] if error.ndim == 3 else error, starts)
     commanded = np.swapaxes(joint[kept], 0, 1)
     return found, commanded
 
@@ -107,7 +109,8 @@ def _commanded_joints(
     for k, tension in enumerate(tau):
         loaded = history.robot_at(robot, k)
         x, R = history.position_m[k], history.rotation[k]
-        commands = inverse.commands(loaded, wires, x[None], R[None], tension[None], strain, error.T)
+        off = error[k] if error.ndim == 3 else error
+        commands = inverse.commands(loaded, wires, x[None], R[None], tension[None], strain, off.T)
         joints.append(commands.joint_m)
     return np.stack(joints)
 

@@ -72,7 +72,7 @@ def wanted(robot: Robot, history: History, found: Estimate, to: Target) -> Float
         strain = found.track.strain[:, k].T
         x, R, tau = to.position_m[k][None], to.rotation[k][None], to.tension_N[k][None]
         loaded = history.robot_at(robot, k)
-        out[:, k] = inverse.commands(loaded, found.wires, x, R, tau, strain, found.error_m.T).joint_m
+        out[:, k] = inverse.commands(loaded, found.wires, x, R, tau, strain, found.error_at(k).T).joint_m
     return out
 
 
@@ -102,7 +102,7 @@ def error_left(robot: Robot, history: History, found: Estimate, to: Target, join
         position = to.position_m[k]
         joints = np.broadcast_to(joint_m[..., k, :], (n, robot.legs))
         bare, offset = inverse.lengths(robot, joints)
-        zero = (bare + found.error_m) * (1.0 + found.track.strain[:, k])
+        zero = (bare + found.error_at(int(k))) * (1.0 + found.track.strain[:, k])
         loaded = history.robot_at(robot, int(k))
         there = forward.solve_equilibrium(loaded, found.wires, zero, offset, position, to.rotation[k])
         distance = np.linalg.norm(there.position_m - position, axis=1)

@@ -32,8 +32,8 @@ class Estimate:
     plain : Track
         One column: the mean wire, which never creeps; where the same commands lead it.
     wires : Wires
-    error_m : (n, w) array
-        Errors of the reference lengths.
+    error_m : (n, w) or (t, n, w) array
+        Errors of the reference lengths, or of the lengths at every row.
     starts_s : (s,) array
         Times at which the wires' clocks start.
     misfit : float or None
@@ -55,6 +55,10 @@ class Estimate:
     converged: bool = True
     effective: float | None = None
     used: bool = True
+
+    def error_at(self, row: int) -> Floats:
+        """(n, w) errors of the lengths at a row."""
+        return self.error_m[row] if self.error_m.ndim == 3 else self.error_m
 
 
 def estimate_poses(
@@ -193,8 +197,8 @@ class _Way:
         ----------
         wires : Wires
             n draws.
-        error_m : (n, w) array
-            Errors of the reference lengths.
+        error_m : (n, w) or (t, n, w) array
+            Errors of the reference lengths, or of the lengths at every row.
         carried : CreepState
         name : str
             For the progress.
@@ -228,7 +232,8 @@ class _Way:
         without : (w,) bool array
             Wires that bear nothing.
         """
-        wires, error = self.known.columns(white)
+        wires, _ = self.known.columns(white)
+        error = self.known.lengths_along(white, self.plain)
         if without.any():
             stiffness = np.where(without[:, None], _NONE * wires.theta["k1"], wires.theta["k1"])
             wires = replace(wires, theta=dict(wires.theta) | {"k1": stiffness})
@@ -236,11 +241,13 @@ class _Way:
 
     def followed(self, white: Floats) -> Estimate:
         """White draws followed."""
-        wires, error = self.known.columns(white)
+        wires, _ = self.known.columns(white)
+        error = self.known.lengths_along(white, self.plain)
         track = self.track(wires, error, self.known.carried(white), "poses")
         return Estimate(track, self.plain, wires, error, self.starts_s)
 
     def estimate(self, out: Draws) -> Estimate:
         """Draws of the posterior that were followed."""
-        columns = self.known.columns(out.white[:, : self.known.count])
-        return Estimate(out.track, self.plain, *columns, self.starts_s)
+        white = out.white[:, : self.known.count]
+        wires, _ = self.known.columns(white)
+        return Estimate(out.track, self.plain, wires, self.known.lengths_along(white, self.plain), self.starts_s)

@@ -94,8 +94,8 @@ def follow_log(
         Where the first forward solution starts from.
     starts_s : array
         Rising times at which the wires' clocks restart (`clock_starts`).
-    error_m : (n, w) array or float
-        What the zero-tension lengths before creep are beyond what the joint values say.
+    error_m : (n, w) or (t, n, w) array or float
+        What the zero-tension lengths before creep are beyond what the joint values say; at every row, or always.
     progress : function of a row
     carried : CreepState, optional
         What the wires bring along; default: they were never loaded.
@@ -112,20 +112,21 @@ def follow_log(
     if carried is not None:
         brought = _without_clocks(carried, wires)
     schedule = _schedule(times, joint_m)
+    errors = _errors_by_time(times, error_m)
     first_robot = history.robot_at(robot, 0)
-    walk = _begin(first_robot, wires, schedule, since, start, brought, error_m)
+    walk = _begin(first_robot, wires, schedule, since, start, brought, errors)
     ahead = [float(time) for time in starts_s if time > since]
     for k, time in enumerate(times):
         while ahead and ahead[0] < time:
             walk.to(ahead[0] - since)
             since = ahead.pop(0)
-            walk = _again(walk, schedule, since)
+            walk = _again(walk, schedule, errors, since)
         walk.to(float(time) - since)
         if k and _loaded(history, k):
             walk.load(history.robot_at(robot, k))
         if ahead and ahead[0] == time:
             since = ahead.pop(0)
-            walk = _again(walk, schedule, since)
+            walk = _again(walk, schedule, errors, since)
         _note(track, k, walk)
         progress(k)
     return track
@@ -221,16 +222,25 @@ def _begin(
     since_s: float,
     start: Poses,
     carried: CreepState,
-    error_m: Floats | float,
+    errors: Callable[[float], Floats],
 ) -> CreepingHold:
     """A hold that begins at a time of the history."""
-    return CreepingHold(robot, wires, lambda time_s: schedule(since_s + time_s), start, carried, error_m=error_m)
+
+    def joint(time_s: float) -> Floats:
+        return schedule(since_s + time_s)
+
+    def error(time_s: float) -> Floats:
+        return errors(since_s + time_s)
+
+    return CreepingHold(robot, wires, joint, start, carried, error_m=error)
 
 
-def _again(walk: CreepingHold, schedule: Callable[[float], Floats], since_s: float) -> CreepingHold:
+def _again(
+    walk: CreepingHold, schedule: Callable[[float], Floats], errors: Callable[[float], Floats], since_s: float
+) -> CreepingHold:
     """The hold that follows one: from its pose, with its creep."""
     carried = _without_clocks(walk.creep.state(), walk.wires)
-    return _begin(walk.robot, walk.wires, schedule, since_s, _pose(walk), carried, walk.error_m)
+    return _begin(walk.robot, walk.wires, schedule, since_s, _pose(walk), carried, errors)
 
 
 def _loaded(history: History, row: int) -> bool:
@@ -240,7 +250,7 @@ def _loaded(history: History, row: int) -> bool:
 
 
 def _schedule(times_s: Floats, joint_m: Floats) -> Callable[[float], Floats]:
-    """Joint values by time, even between the rows."""
+    """Joint values, or errors of lengths, by time, even between the rows."""
 
     def joint(time_s: float) -> Floats:
         k = int(np.clip(np.searchsorted(times_s, time_s, "right") - 1, 0, len(times_s) - 2))
@@ -248,6 +258,12 @@ def _schedule(times_s: Floats, joint_m: Floats) -> Callable[[float], Floats]:
         return joint_m[k] + share * (joint_m[k + 1] - joint_m[k])
 
     return joint
+
+
+def _errors_by_time(times_s: Floats, error_m: Floats | float) -> Callable[[float], Floats]:
+    """Errors of the lengths by time: even between the rows, or the same always."""
+    errors = np.asarray(error_m, float)
+    return _schedule(times_s, errors) if errors.ndim == 3 else lambda time_s: errors
 
 
 def _without_clocks(state: CreepState, wires: Wires) -> CreepState:

@@ -96,9 +96,9 @@ class LiveEstimator:
             white = np.concatenate([white, known.differences(at_zero)])
         wires, error = known.columns(white)
         carried = known.carried(white)
-        none = np.zeros((1, legs))
+        self._known, self._white = known, white
         self._wires = beside(wires, known.plain)
-        self._error = np.concatenate([error, none])
+        self._error = np.concatenate([error, np.zeros((1, legs))])
         self._state = beside_fresh(carried, legs)
         self._columns = len(self._error)
         self._live = np.ones(self._columns, bool)
@@ -271,6 +271,9 @@ class LiveEstimator:
         bare, offset = inverse.lengths(self.robot, joint_m)
         self._state = self._creep.advance(time_s - self._since, self._tension.T)
         self._go(self._grown(bare), offset)
+        if self._known.errors_move:
+            self._place_errors((self._x[-1:], self._R[-1:]), self._tension[-1:])
+            self._go(self._grown(bare), offset)
         change = np.abs(self._tension[-1] - self._reference).max()
         if change > RESTART * self._reference.mean():
             self._begin(time_s)
@@ -281,7 +284,19 @@ class LiveEstimator:
         return (bare + self._error) * (1.0 + strain)
 
     def _settle(self, joint_m: Floats) -> None:
-        """The first pose, found from afar."""
+        """The first pose, found from afar; once more where the lengths depend on it."""
+        x, R = self._start
+        self._place_errors((x[None], R[None]), np.zeros((1, self.robot.legs)))
+        self._settle_at(joint_m)
+        if self._known.errors_move:
+            self._place_errors((self._x[-1:], self._R[-1:]), self._tension[-1:])
+            self._settle_at(joint_m)
+
+    def _place_errors(self, poses: Poses, tension_N: Floats) -> None:
+        """Errors of the lengths are those at a pose; the wires that never creep have none."""
+        self._error[:-1] = self._known.lengths_at(self._white, poses, tension_N)[0]
+
+    def _settle_at(self, joint_m: Floats) -> None:
         bare, offset = inverse.lengths(self.robot, joint_m)
         zero = self._grown(bare)
         here = forward.solve_equilibrium(self.robot, self._wires, zero, offset, *self._start)

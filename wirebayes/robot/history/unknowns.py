@@ -8,8 +8,8 @@ from scipy.linalg import solve_triangular
 from scipy.special import ndtri
 
 from wirebayes.numeric.typing import Floats
-from wirebayes.robot.history.follow import uncreeping
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.history.follow import Track, uncreeping
+from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.mechanics.draws import CORE, WireDraws
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion.creep import CreepState, fresh
@@ -86,6 +86,42 @@ class LogUnknowns:
         if self.calibrated is None:
             return fresh(self.robot.legs, len(white))
         return self.calibrated.carried(self.mean + white @ self.root.T)
+
+    @property
+    def errors_move(self) -> bool:
+        """Whether the lengths' errors differ from pose to pose, because points may be off."""
+        return self.calibrated is not None and bool(self.calibrated.points)
+
+    def lengths_at(self, white: Floats, poses: Poses, tension_N: Floats) -> Floats:
+        """Errors ``(t, n, w)`` of the lengths of white unknowns ``(n, d)`` at poses.
+
+        Parameters
+        ----------
+        white : (n, d) array
+        poses : (t, 3), (t, 3, 3) arrays
+        tension_N : (t, w) array
+            Of the mean wires there.
+        """
+        errors = self.mean + white @ self.root.T
+        if self.calibrated is None:
+            return np.broadcast_to(errors[:, : self.robot.legs], (len(tension_N), len(white), self.robot.legs))
+        return self.calibrated.error_m(errors, poses, tension_N)
+
+    def lengths_along(self, white: Floats, track: Track) -> Floats:
+        """Errors of the lengths of white unknowns ``(n, d)``: ``(t, n, w)`` where they move, else ``(n, w)``.
+
+        Parameters
+        ----------
+        white : (n, d) array
+        track : Track
+            Its first column says where the platform is, about; where it has fallen, the row before counts.
+        """
+        held = track.held[0]
+        if not self.errors_move or not held[0]:
+            return (self.mean + white @ self.root.T)[:, : self.robot.legs]
+        row = np.maximum.accumulate(np.where(held, np.arange(len(held)), 0))
+        poses = track.position_m[0, row], track.rotation[0, row]
+        return self.lengths_at(white, poses, track.tension_N[0, row])
 
     @property
     def plain(self) -> Wires:

@@ -35,7 +35,7 @@ class CreepingHold:
         As in `drift.hold`.
     start : (3,) or (n, 3), (3, 3) or (n, 3, 3) arrays
         Where the first forward solution starts from.
-    error_m : (n, w) array or float
+    error_m : (n, w) array, function of the time since the hold began, or float
         What the zero-tension lengths before creep are beyond what the joint values say.
     needed : float
         The hold is followed while at least this share of the draws have not fallen.
@@ -62,7 +62,7 @@ class CreepingHold:
         carried: CreepState | None = None,
         follow: Follow = "current",
         tolerance: float = TOLERANCE,
-        error_m: Floats | float = 0.0,
+        error_m: Floats | Callable[[float], Floats] | float = 0.0,
         needed: float = 0.0,
         slip: path.Slip | None = None,
         least_mm: float = 0.0,
@@ -106,7 +106,7 @@ class CreepingHold:
         joint = self.joint(time_s) if callable(self.joint) else self.joint
         each = np.broadcast_to(joint, (self.n, self.robot.legs))
         bare, offset = inverse.lengths(self.robot, each)
-        bare = bare + self.error_m
+        bare = bare + (self.error_m(time_s) if callable(self.error_m) else self.error_m)
         return bare * (1.0 + state.strain(self.wires).T), np.broadcast_to(offset, bare.shape)
 
     def to(self, stop_s: float) -> None:

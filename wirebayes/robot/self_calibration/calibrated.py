@@ -6,13 +6,16 @@ from typing import Any
 import numpy as np
 
 from wirebayes.json_files.calibrate import CalibratedUnknowns
-from wirebayes.numeric.linear_algebra import solve
+from wirebayes.numeric.batches import batch_first, batch_last
 from wirebayes.numeric.typing import Floats
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics import statics
+from wirebayes.robot.mechanics.description import GRAVITY, Poses, Robot
 from wirebayes.robot.mechanics.draws import WireDraws, lines_of, nominal_length
 from wirebayes.robot.mechanics.rotation import matrix, vector
 from wirebayes.robot.motion.creep import CreepState
 from wirebayes.robot.self_calibration import predicted
+from wirebayes.robot.self_calibration.by_points import swing
+from wirebayes.robot.self_calibration.equations import moved
 from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
@@ -24,14 +27,18 @@ class Calibrated:
     Attributes
     ----------
     robot : Robot
+        With its points where they were found.
     prior : LengthPrior
-        Says what the unknowns are.
+        Says what the first unknowns are.
     session : Session
     mean : (d,) array
-        Reference errors, parameters and specimens' deviations in the order of `LengthPrior.moments`, without biases.
+        Reference errors, parameters and specimens' deviations in the order of `LengthPrior.moments`, without biases;
+        then, of the points that were estimated, how far they are from where they were found, m.
     covariance : (d, d) array
-    by_pose_m : (w,) array
-        Standard deviation of how the lengths' errors, those of the points among them, differ from pose to pose.
+    pull_N : (p, w) array
+        Tensions at the ends of the session's holds.
+    points : tuple of str
+        Which points were estimated: ``exit`` (in the world's axes), ``platform`` (in the platform's).
     """
 
     robot: Robot
@@ -39,32 +46,80 @@ class Calibrated:
     session: Session
     mean: Floats
     covariance: Floats
-    by_pose_m: Floats
-
-    @property
-    def pulls_N(self) -> Floats:
-        """(w,) what lengths that are off by `by_pose_m` make of the wires' tensions at most."""
-        stiffness_N = [line.parameters["k1"].mean() for line in lines_of(self.robot, self.prior.line)]
-        return np.array(stiffness_N) * self.by_pose_m / nominal_length(self.robot)
+    pull_N: Floats
+    points: tuple[str, ...] = ()
 
     @property
     def reference_sd_m(self) -> Floats:
         """(w,) what is still not known of the reference lengths."""
         return np.sqrt(np.diag(self.covariance)[: self.robot.legs])
 
+    @property
+    def swing_N(self) -> Floats:
+        """(w,) by how much points that are off change tensions, as they turn wires that bear about the weight."""
+        robot = self.robot
+        d = len(self.mean) - 3 * robot.legs * len(self.points)
+        variance = np.diag(self.covariance)[d:].reshape(len(self.points), robot.legs, 3).mean(2).sum(0)
+        return robot.mass_kg * GRAVITY * np.sqrt(variance) / nominal_length(robot)
+
     def carried(self, unknowns: Floats) -> CreepState:
         """Creep that wires of unknowns ``(n, d)`` carry out of the session; it depends on them as the readings do."""
-        return predicted.carried(self.robot, self.prior, self.session, unknowns)
+        error_m = self.error_m(unknowns, (self.session.position_m, self.session.rotation), self.pull_N)
+        return predicted.carried(self.robot, self.prior, self.session, unknowns, error_m)
+
+    def error_m(self, unknowns: Floats, poses: Poses, tension_N: Floats) -> Floats:
+        """What lengths before creep are beyond what joint values say, ``(p, n, w)``.
+
+        A point that is off makes its wire's way longer or shorter, as an error of the reference does, but at every
+        pose by another amount; and it turns the wire, which holds the platform there only with other tensions. Both
+        are taken to first order as the errors of lengths that lead to the same pose.
+
+        Parameters
+        ----------
+        unknowns : (n, d) array
+        poses : (p, 3), (p, 3, 3) arrays
+        tension_N : (p, w) array
+            There, about.
+        """
+        legs = self.robot.legs
+        slopes = self._length_by_points(poses, tension_N)
+        error = np.zeros((len(poses[0]), len(unknowns), legs))
+        first = unknowns.shape[1] - 3 * legs * len(self.points)
+        for name in self.points:
+            end = first + 3 * legs
+            error = error + np.einsum("pwm,nm->pnw", slopes[name], unknowns[:, first:end])
+            first = end
+        return np.asarray(unknowns[:, :legs] + error)
+
+    def _length_by_points(self, poses: Poses, tension_N: Floats) -> dict[str, Floats]:
+        """Errors of lengths by the coordinates of points that come to the same, ``(p, w, 3 w)``."""
+        robot = self.robot
+        position, rotation = poses
+        shape = statics.geometry(robot, position.T, batch_last(rotation))
+        along = batch_first(shape.direction).mT * robot.lines[:, None]
+        tension = np.maximum(tension_N, 0.0)
+        k1 = np.array([line.parameters["k1"].mean() for line in lines_of(robot, self.prior.line)])
+        longer = 1.0 + tension / k1
+        whole = np.where(robot.is_linear, robot.wire_m, robot.lines * shape.distance_m.T + robot.beyond_m)
+        softness = np.where(tension > 0, whole / (k1 * longer), 0.0)  # of wires that bear: m/N
+        tension_by_force = np.linalg.pinv(batch_first(statics.wire_jacobian(robot, shape)) * (tension > 0)[:, None])
+        turns = dict(zip(("exit", "platform"), swing(robot, shape, rotation, tension), strict=True))
+        ways = {"exit": -along, "platform": np.einsum("pwi,pij->pwj", along, rotation)}
+        out = {}
+        for name, way in ways.items():
+            own = np.einsum("pwi,wv->pwvi", way / longer[..., None], np.eye(robot.legs))
+            turned = np.einsum("pwd,pdvi->pwvi", tension_by_force, turns[name])
+            out[name] = -(own + softness[..., None, None] * turned).reshape(*own.shape[:2], -1)
+        return out
 
 
 def calibrated(found: RobotPosterior, session: Session) -> Calibrated:
-    """What a calibration leaves known of references, wires and specimens, for a history on the calibrated robot.
+    """What a calibration leaves known of references, wires, specimens and points, for a history that goes on.
 
     Parameters
     ----------
     found : RobotPosterior
-        With drums that are exact. Biases of its sensors are averaged over. Errors of its geometry stand as those errors
-        of the lengths that come to the same, for a history is followed on one robot, the calibrated one.
+        With drums that are exact. Biases of its sensors are averaged over.
     session : Session
     """
     unknowns = found.unknowns
@@ -72,53 +127,32 @@ def calibrated(found: RobotPosterior, session: Session) -> Calibrated:
     _, root = unknowns.moments
     own = replace(unknowns.prior, bias_sd_N=0.0)
     d = len(own.moments(unknowns.robot.legs)[0])
-    as_lengths = _as_lengths(found)
-    covariance = root @ _mean_covariance(as_lengths, found) @ root.T
+    first = unknowns.slices["wires"].start
+    parts = unknowns.parts(state.white)
+    points = tuple(name for name in ("exit", "platform") if unknowns.slices[name].stop > unknowns.slices[name].start)
+    rows = [np.hstack([np.zeros((d, first)), root[:d], np.zeros((d, unknowns.count - first - len(root)))])]
+    for name in points:
+        sd = unknowns.errors.exit_m if name == "exit" else unknowns.errors.platform_m
+        rows.append(sd * np.eye(unknowns.count)[unknowns.slices[name]])
+    by_white = np.concatenate(rows)
+    mean = np.concatenate([parts.wires[:d], np.zeros(len(by_white) - d)])
     there = replace(session, position_m=state.position_m, rotation=state.rotation)
-    mean = unknowns.parts(state.white).wires[:d]
-    from_mean = as_lengths - as_lengths.mean(0)
-    scatter = np.diag(_mean_covariance(from_mean, found))
-    by_pose_m = own.reference_sd_m * np.sqrt(np.maximum(scatter[: unknowns.robot.legs], 0.0))
-    return Calibrated(unknowns.robot, own, there, mean, covariance[:d, :d], by_pose_m)
-
-
-def _as_lengths(found: RobotPosterior) -> Floats:
-    """References and wires by all unknowns at each pose, ``(p, d, m)``: errors of points as those of lengths.
-
-    A point that is off makes its wire's way longer or shorter, as an error of the reference does, but from pose to pose
-    by another amount. The readings often tell the sum of both well, and neither alone.
-    """
-    unknowns = found.unknowns
-    wires = unknowns.slices["wires"]
-    if wires.start == 0:  # points are exact
-        return np.eye(unknowns.of_wires, unknowns.count)[None]
-    loop = found.equations.by_robot[:, found.equations.rows["loop"]]
-    by_reference = loop[..., unknowns.references]
-    out = np.zeros((len(loop), unknowns.of_wires, unknowns.count))
-    out[:, :, wires] = np.eye(unknowns.of_wires)
-    for name in ("exit", "platform"):
-        part = unknowns.slices[name]
-        if part.stop > part.start:
-            out[:, : unknowns.robot.legs, part] = solve(by_reference, loop[..., part])
-    return out
-
-
-def _mean_covariance(by_unknowns: Floats, found: RobotPosterior) -> Floats:
-    """Covariance ``(d, d)``, averaged over poses, of what follows all unknowns linearly by ``(p, d, m)``."""
-    return np.asarray((by_unknowns @ found.covariance @ by_unknowns.mT).mean(0))
+    robot = moved(unknowns.robot, parts) if points else unknowns.robot
+    return Calibrated(robot, own, there, mean, by_white @ found.covariance @ by_white.T, state.pull_N, points)
 
 
 def to_dict(found: Calibrated) -> CalibratedUnknowns:
     """Everything but the robot and the line, which a command is given anyway."""
     session = found.session
     return {
-        "version": 1,
+        "version": 2,
         "reference_sd_mm": 1e3 * found.prior.reference_sd_m,
         "specimen_spread": found.prior.spread,
         "line": found.prior.names,
         "mean": found.mean,
         "covariance": found.covariance,
-        "by_pose_mm": 1e3 * found.by_pose_m,
+        "points": list(found.points),
+        "pull_N": found.pull_N,
         "session": {
             "position_m": session.position_m,
             "rotation_vector_rad": vector(session.rotation),
@@ -146,11 +180,12 @@ def from_dict(values: Any, robot: Robot, line: WireDraws) -> Calibrated:
     prior = LengthPrior(line, 1e-3 * float(values["reference_sd_mm"]), float(values["specimen_spread"]))
     mean = np.array(values["mean"], float)
     covariance = np.array(values["covariance"], float)
-    by_pose_m = 1e-3 * np.array(values["by_pose_mm"], float)
-    d = len(prior.moments(robot.legs)[0])
+    points = tuple(str(name) for name in values["points"])
+    pull_N = np.array(values["pull_N"], float)
+    d = len(prior.moments(robot.legs)[0]) + 3 * robot.legs * len(points)
     if list(values["line"]) != prior.names or mean.shape != (d,) or covariance.shape != (d, d):
         raise ValueError("other unknowns")
-    return Calibrated(robot, prior, _session(values["session"], robot), mean, covariance, by_pose_m)
+    return Calibrated(robot, prior, _session(values["session"], robot), mean, covariance, pull_N, points)
 
 
 def _session(values: Any, robot: Robot) -> Session:

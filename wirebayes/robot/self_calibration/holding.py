@@ -57,21 +57,23 @@ def holds(
     robot : Robot
     wires : Wires
         ``n`` columns.
-    error_m : (n, w) array
-        Of the reference lengths.
+    error_m : (n, w) or (p, n, w) array
+        Of the reference lengths, or of the lengths at every hold.
     session : Session
     resolved_N : float
         What is resolved of a tension: steps err by a small share of it.
     longest_step : float
         Longest step in the logarithm of time between tension updates; the first is a thousandth of the hold.
     """
-    n, legs = error_m.shape
+    n, legs = error_m.shape[-2:]
+    errors = np.broadcast_to(error_m, (len(session.duration_s), n, legs))
     state = fresh(legs, n)
     pace = _Pace(_FIRST, longest_step)
     starts = zip(session.position_m, session.rotation, strict=True)
-    for joint, duration, start in zip(session.joint_m, session.duration_s, starts, strict=True):
+    each = zip(session.joint_m, session.duration_s, starts, errors, strict=True)
+    for joint, duration, start, error in each:
         bare, offset = inverse.lengths(robot, np.broadcast_to(joint, (n, legs)))
-        walk = _Walk(robot, wires, (bare + error_m, offset), start, state, resolved_N)
+        walk = _Walk(robot, wires, (bare + error, offset), start, state, resolved_N)
         walk.through(float(duration), pace, longest_step)
         state = walk.creep.state()
         yield SessionHold(walk.here, walk.bare, state)

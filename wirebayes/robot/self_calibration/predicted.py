@@ -100,7 +100,9 @@ def _poses(solved: Sequence[forward.Equilibria]) -> Poses:
     return np.stack([one.position_m for one in solved], 1), np.stack([one.rotation for one in solved], 1)
 
 
-def carried(robot: Robot, prior: LengthPrior, session: Session, unknowns: Floats) -> CreepState:
+def carried(
+    robot: Robot, prior: LengthPrior, session: Session, unknowns: Floats, error_m: Floats | None = None
+) -> CreepState:
     """What the wires of every row of unknowns ``(n, d)`` carry out of the session.
 
     Parameters
@@ -109,6 +111,8 @@ def carried(robot: Robot, prior: LengthPrior, session: Session, unknowns: Floats
     prior : LengthPrior
     session : Session
     unknowns : (n, d) array
+    error_m : (p, n, w) array, optional
+        Of the lengths at every hold; those of the references when left out.
 
     Returns
     -------
@@ -116,6 +120,8 @@ def carried(robot: Robot, prior: LengthPrior, session: Session, unknowns: Floats
         NaN where a row does not hold the platform.
     """
     wires, error = prior.wires(robot, unknowns)
+    if error_m is not None:
+        error = error_m
     lost = np.zeros(len(unknowns), bool)
     resolved = _RESOLVED * max(robot.mass_kg * GRAVITY, robot.rule.lowest_N)
     for hold in holds(robot, wires, error, session, resolved):
