@@ -34,7 +34,7 @@ from wirebayes.robot.self_calibration.mistaken import column_notices, tension_no
 from wirebayes.robot.self_calibration.next_poses import NextPoses, next_poses
 from wirebayes.robot.self_calibration.open_where import contradicted_requests, most_open, odd_hold
 from wirebayes.robot.self_calibration.posterior import RobotPosterior
-from wirebayes.robot.self_calibration.residuals import contradicted, length_rms_m, lost, misfit, trust
+from wirebayes.robot.self_calibration.residuals import contradicted, length_rms_m, lost, misfit, shown_joint_m, trust
 from wirebayes.robot.self_calibration.search import RATHER, Searched, StatedPoses, searched
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import Summary, summarised, wire_notices
@@ -366,10 +366,13 @@ def _inexact(search: Searched) -> str:
             "exit and platform points, which are taken as exact, --wires, the readings' units and signs, their order, "
             "--tension-sd and --reference-sd"
         )
+    poses = search.holds.placed.any() and found.unknowns.errors.pose_m == 0
+    exact, stated = (" and stated poses", "--pose-sd for the poses, ") if poses else ("", "")
     return (
-        f"geometry, taken as exact, and joint values agree to {short(1e3 * found.noise.joint_m, 2)} mm only (joint "
-        f"test, {chance(search.p)}): do not use these values; give --anchor-sd, or --joint-sd if the joint values "
-        "are that uncertain, and check --wires, the readings' units and signs, --tension-sd and --reference-sd"
+        f"geometry{exact}, taken as exact, and joint values agree to {short(1e3 * shown_joint_m(found), 2)} mm only "
+        f"(joint test, {chance(search.p)}): do not use these values; give --anchor-sd, {stated}or --joint-sd if the "
+        "joint values are that uncertain, and check --wires, the readings' units and signs, --tension-sd and "
+        "--reference-sd"
     )
 
 

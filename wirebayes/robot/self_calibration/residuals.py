@@ -211,6 +211,14 @@ def _shown(found: RobotPosterior, rows: str, sd: float, usual: float, worth: flo
     return float(np.sqrt((squares + worth * usual**2) / free)), free
 
 
+def shown_joint_m(found: RobotPosterior) -> float:
+    """Error of a joint value that the readings show by themselves, without what is usual, m."""
+    loops = found.equations.rows["loop"]
+    checks = np.maximum(1.0 - leverage(found, loops), 0.0).sum()
+    squares = (found.equations.residual[:, loops] ** 2).sum()
+    return float(found.noise.joint_m * np.sqrt(squares / max(checks, 1.0)))
+
+
 def leverage(found: RobotPosterior, rows: slice) -> Floats:
     """(p, r) share of each residual's variance that the unknowns take up."""
     by_hold = found.equations.by_hold[:, rows]
