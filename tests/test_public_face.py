@@ -171,6 +171,7 @@ def test_what_is_no_test_at_all_is_named():
         (lambda test: wb.fit(test, together=3), "--together: found 3, expected a material"),
         (lambda test: wb.discover(test, without=3), "without: found 3, expected a name or several"),
         (lambda test: wb.plan(test, budget_min="1 h"), "--budget-min: found '1 h', expected a finite number above 0"),
+        (lambda test: wb.plan(test, experiment="nope"), "found no experiment 'nope', expected one of"),
         (lambda test: wb.plan(test, aim=3), "--aim: found 3, expected a name or several"),
         (lambda test: wb.pose("linear-7", draws=0), "--draws: found 0, expected a whole number, 1 or more"),
         (lambda test: wb.export("linear-7", draws="x"), "--draws: found 'x', expected a whole number, 1 or more"),

@@ -204,7 +204,8 @@ def _request(
 ) -> PlanRequest:
     """Tests and guess of whatever was given."""
     if isinstance(source, Experiment):
-        return _of_experiment(source, n, kinds, spec, rng)
+        (measured,) = select([source], name)
+        return _of_experiment(measured, n, kinds, spec, rng)
     if not isinstance(source, str | os.PathLike):
         raise InputError(f"source: found {type(source).__name__}, expected a path or an Experiment")
     path = Path(source)
