@@ -142,7 +142,7 @@ def test_every_output_of_the_hangprinters_tutorial_is_one_that_its_run_wrote():
     assert f"{held} of 12 intervals hold the truth" in table
 
 
-_NUMBER = re.compile(r"(?<![\w-])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+_NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
 def test_every_output_of_the_tutorial_is_one_that_its_run_wrote():
