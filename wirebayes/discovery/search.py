@@ -15,12 +15,12 @@ from numpy.random import Generator
 
 from wirebayes.discovery import gross_errors, power, residual_patterns, shrinking
 from wirebayes.discovery.alternatives import Alternative, alternatives
+from wirebayes.discovery.doubts import likely_beside, samples_may_differ
 from wirebayes.discovery.families import block_ratio, called, family_names, family_sentence
 from wirebayes.discovery.global_test import Gate, examine
 from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.investigation import Concluded, Investigation
 from wirebayes.discovery.judgement import Evidence, FamilyEvidence
-from wirebayes.discovery.likely_beside import likely_beside, samples_may_differ
 from wirebayes.discovery.material_answer import MaterialAnswer, answer_material
 from wirebayes.discovery.model_space import largest_first
 from wirebayes.discovery.naming import Named, name_effects

@@ -9,7 +9,7 @@ from wirebayes.numeric.typing import Floats, Indices, Ints
 from wirebayes.progress import Progress, silent
 from wirebayes.robot.history.balanced import balanced
 from wirebayes.robot.history.estimate import Estimate
-from wirebayes.robot.history.follow import RESTART, Track, clock_starts, follow_log
+from wirebayes.robot.history.follow import RESTART, Track, clock_starts, errors_at, follow_log
 from wirebayes.robot.history.history import History, divided
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics.description import Robot
@@ -79,7 +79,7 @@ def drift_along(
 
     track = follow_log(robot, wires, fine, joint, start, starts, error, watched, carried)
     plain = _without_drift(fine, tau, track.hold)
-    found = Estimate(track.at_rows(kept), plain.at_rows(kept), wires, error[kept] if error.ndim == 3 else error, starts)
+    found = Estimate(track.at_rows(kept), plain.at_rows(kept), wires, errors_at(error, kept), starts)
     commanded = np.swapaxes(joint[kept], 0, 1)
     return found, commanded
 
@@ -109,7 +109,7 @@ def _commanded_joints(
     for k, tension in enumerate(tau):
         loaded = history.robot_at(robot, k)
         x, R = history.position_m[k], history.rotation[k]
-        off = error[k] if error.ndim == 3 else error
+        off = errors_at(error, k)
         commands = inverse.commands(loaded, wires, x[None], R[None], tension[None], strain, off.T)
         joints.append(commands.joint_m)
     return np.stack(joints)

@@ -8,7 +8,7 @@ from wirebayes.numeric.means import mean_of_finite
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.progress import Progress, silent
 from wirebayes.robot.history.conditioning import Draws, LogReadings, Mode, draw_posterior, find_mode, slack_wires
-from wirebayes.robot.history.follow import Track, clock_starts, follow_log, refined_joints
+from wirebayes.robot.history.follow import Track, clock_starts, errors_at, follow_log, refined_joints
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.readings import reading_weight, sensors
 from wirebayes.robot.history.unknowns import LogUnknowns, Uncertain, unknowns
@@ -58,7 +58,7 @@ class Estimate:
 
     def error_at(self, row: int) -> Floats:
         """(n, w) errors of the lengths at a row."""
-        return self.error_m[row] if self.error_m.ndim == 3 else self.error_m
+        return errors_at(self.error_m, row)
 
 
 def estimate_poses(
@@ -232,8 +232,7 @@ class _Way:
         without : (w,) bool array
             Wires that bear nothing.
         """
-        wires, _ = self.known.columns(white)
-        error = self.known.lengths_along(white, self.plain)
+        wires, error = self.known.columns_along(white, self.plain)
         if without.any():
             stiffness = np.where(without[:, None], _NONE * wires.theta["k1"], wires.theta["k1"])
             wires = replace(wires, theta=dict(wires.theta) | {"k1": stiffness})
@@ -241,13 +240,11 @@ class _Way:
 
     def followed(self, white: Floats) -> Estimate:
         """White draws followed."""
-        wires, _ = self.known.columns(white)
-        error = self.known.lengths_along(white, self.plain)
+        wires, error = self.known.columns_along(white, self.plain)
         track = self.track(wires, error, self.known.carried(white), "poses")
         return Estimate(track, self.plain, wires, error, self.starts_s)
 
     def estimate(self, out: Draws) -> Estimate:
         """Draws of the posterior that were followed."""
         white = out.white[:, : self.known.count]
-        wires, _ = self.known.columns(white)
-        return Estimate(out.track, self.plain, wires, self.known.lengths_along(white, self.plain), self.starts_s)
+        return Estimate(out.track, self.plain, *self.known.columns_along(white, self.plain), self.starts_s)

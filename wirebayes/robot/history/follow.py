@@ -266,6 +266,11 @@ def _errors_by_time(times_s: Floats, error_m: Floats | float) -> Callable[[float
     return _schedule(times_s, errors) if errors.ndim == 3 else lambda time_s: errors
 
 
+def errors_at(error_m: Floats, rows: int | Indices) -> Floats:
+    """Errors of the lengths at a row, or at several: of ``(t, n, w)`` errors those, of ``(n, w)`` the same at all."""
+    return error_m[rows] if error_m.ndim == 3 else error_m
+
+
 def _without_clocks(state: CreepState, wires: Wires) -> CreepState:
     """What goes into the next hold; the clocks of earlier ones only where an effect may remember them."""
     return state if wires.effects else replace(state, past=())

@@ -123,6 +123,11 @@ class LogUnknowns:
         poses = track.position_m[0, row], track.rotation[0, row]
         return self.lengths_at(white, poses, track.tension_N[0, row])
 
+    def columns_along(self, white: Floats, track: Track) -> tuple[Wires, Floats]:
+        """The wires of white unknowns, and the errors of their lengths as `lengths_along` has them."""
+        wires, _ = self.columns(white)
+        return wires, self.lengths_along(white, track)
+
     @property
     def plain(self) -> Wires:
         """The mean wire without creep: what a controller knows."""

@@ -2,7 +2,7 @@
 
 import pytest
 
-from wirebayes.discovery.likely_beside import likely_beside, samples_may_differ
+from wirebayes.discovery.doubts import likely_beside, samples_may_differ
 from wirebayes.discovery.settings import REMAINS
 
 ABOVE, BELOW = REMAINS + 0.01, REMAINS - 0.01

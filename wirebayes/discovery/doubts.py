@@ -1,4 +1,4 @@
-"""What may be missing beside what was named: what is likely and not established, or samples that differ."""
+"""What a search says against its own final model: what is likely and not established, or samples that differ."""
 
 from collections.abc import Sequence
 
