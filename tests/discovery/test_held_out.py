@@ -13,6 +13,10 @@ from tests.model.dense import given, jacobian, normal
 from tests.simulated import simulated_tests
 from wirebayes.discovery import held_out
 from wirebayes.effects import effect_named
+from wirebayes.inference.laplace_fit import fitted
+from wirebayes.inference.log_posterior import LogPosterior
+from wirebayes.inference.optimum import Optimum
+from wirebayes.inference.sampler.ensemble import sample_posterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.build import build
 from wirebayes.model.scales import Scales
@@ -154,8 +158,8 @@ def test_training_begins_at_the_block_s_own_fit_where_it_has_the_same_effects(
         given.append(([len(e.recorded_holds) for e in experiments], *rest))
         return "trained"
 
-    def draws(trained: str, rng: object, n: int) -> tuple[object, np.ndarray]:
-        assert trained == "trained" and n == 500
+    def draws(trained: str, rng: object, n: int, wanted: float) -> tuple[object, np.ndarray]:
+        assert trained == "trained" and n == 4000 and wanted == 5000
         values = WIRE | {"superposition.omega": 0.5}
         return problem, np.tile([values[name.split("[")[0]] for name in problem.names], (5, 1))
 
@@ -172,13 +176,36 @@ def test_training_begins_at_the_block_s_own_fit_where_it_has_the_same_effects(
 
 
 def test_draws_of_a_block_come_with_all_its_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(held_out.rough_draws, "draws", lambda target, modes, rng, n: (target.problem, modes, n))
+    monkeypatch.setattr(
+        held_out.rough_draws, "draws", lambda target, modes, rng, n, wanted: (target.problem, modes, n, wanted)
+    )
     monkeypatch.setattr(held_out, "completed", lambda problem, theta, rng: (f"whole {problem}", theta, None))
     block = SimpleNamespace(target=SimpleNamespace(problem="problem"), modes="modes")
-    assert held_out._draws(block, np.random.default_rng(0), 7) == (  # type: ignore[arg-type]
+    assert held_out._draws(block, np.random.default_rng(0), 7, 9.0) == (  # type: ignore[arg-type]
         "whole problem",
-        ("problem", "modes", 7),
+        ("problem", "modes", 7, 9.0),
     )
+
+
+def test_errors_of_predictions_with_a_long_tail_are_those_of_a_long_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The posterior of B and U is curved here; with 500 draws the error of the mean was half as large."""
+    creep = {"B": 0.35, "U": 0.8, "k2": 0.03, "N": 0.6, "tension_dependent_rate.m": 0.8}
+    effects = (effect_named("tension_dependent_rate"),)
+    displacements = [*range(1, 13), *range(11, 6, -1)]
+    bench = Bench(length_mm=1200.0, displacements_mm=displacements, times_s=[0, 15, 30, 60, 120])
+    tests = simulated_tests([bench], Truth(WIRE | creep | {"setting_sd": 0.006}, effects), seed=2)
+    train = [held_out.last_third(tests[0])]
+    block = fitted(tests, effects, PLAIN_SPEC, np.random.default_rng(0))
+    [found] = held_out.predicted(tests, train, effects, block, np.random.default_rng(1))
+
+    def long_run(target: LogPosterior, modes: Optimum, *_: object) -> np.ndarray:
+        chains = sample_posterior(target, 2, found=modes)
+        return target.coordinates.to_natural(chains.z.reshape(-1, chains.z.shape[-1]))
+
+    monkeypatch.setattr(held_out.rough_draws, "draws", long_run)
+    [expected] = held_out.predicted(tests, train, effects, block, np.random.default_rng(1))
+    assert found.rmse_N == pytest.approx(expected.rmse_N, rel=0.2)
+    assert found.elpd.sum() == pytest.approx(expected.elpd.sum(), abs=1.0)
 
 
 @pytest.mark.parametrize(("deviations", "share"), [(1.5, 1.0), (-1.5, 1.0), (1.8, 0.0), (-1.8, 0.0)])

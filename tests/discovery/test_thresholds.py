@@ -84,7 +84,7 @@ def test_bands_of_held_out_readings_hold_nine_in_ten(
     problem = build([one.train(3)])
     theta = np.tile([WIRE[name] for name in problem.names], (500, 1))
     monkeypatch.setattr(held_out, "fitted", lambda *given, **_: None)
-    monkeypatch.setattr(held_out, "_draws", lambda block, rng, n: (problem, theta))
+    monkeypatch.setattr(held_out, "_draws", lambda *_: (problem, theta))
     block = SimpleNamespace(effects=("none",), spec=PLAIN_SPEC, scales=None)
     (found,) = held_out.predicted([one], [3], (), block, Even())  # type: ignore[arg-type]
     assert found.inside == covered
