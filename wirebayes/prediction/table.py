@@ -28,8 +28,8 @@ from wirebayes.wire.protocol import Control
 
 FAR_OFF = 5.0  # standard deviations of a first reading: one in a million by chance, a wrong unit is at hundreds
 FAR_UP = 2.0  # times the largest tested tension: nothing there was tested
-# Times the longest tested hold. Of 180 simulated tests by holds of 90 s, whose creep went on by a logarithm or a power of
-# time, or by a second and slow relaxation (of 120 that were checked 113 passed), 90 % bands of rising holds and of rests
+# Times the longest tested hold. Of 180 simulated tests by holds of 90 s, whose creep went on by a logarithm or a power
+# of time, or by a second and slow relaxation (113 of 120 passed their check), 90 % bands of rising holds and of rests
 # had 83 to 97 % of the readings at up to 3 times these holds, 65 to 95 % at 5 times, 20 to 87 % at 10 times.
 FAR_ON = 3.0
 _LEAST = 2  # draws of a model that hardly counts: one has no spread
