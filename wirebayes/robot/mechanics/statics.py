@@ -114,13 +114,23 @@ def _with_moments(robot: Robot, u: Floats, r: Floats) -> Floats:
 
 def weight(robot: Robot, rotation: Floats) -> Floats:
     """Wrench of gravity about the reference point, ``(6 or 3, n)``: N and N m, as far as no plane takes it."""
-    n = rotation.shape[-1]
-    force = robot.mass_kg * GRAVITY
-    out = np.zeros((robot.degrees, n))
-    out[2] = -force
+    return at_centre_of_mass(robot, rotation, np.array([0.0, 0.0, -robot.mass_kg * GRAVITY]))
+
+
+def at_centre_of_mass(robot: Robot, rotation: Floats, force_N: Floats) -> Floats:
+    """Wrench about the reference point of a force at the centre of mass, ``(6 or 3, n)``, as far as no plane takes it.
+
+    Parameters
+    ----------
+    robot : Robot
+    rotation : (3, 3, n) array
+    force_N : (3,) array
+    """
+    out = np.zeros((robot.degrees, rotation.shape[-1]))
+    out[:3] = force_N[:, None]
     if robot.degrees == 6:
         arm = turned(robot.centre_of_mass_m[None], rotation)[:, 0]
-        out[3], out[4] = -arm[1] * force, arm[0] * force
+        out[3:] = cross(arm, out[:3])
     return out if robot.motions is None else robot.motions @ out
 
 

@@ -25,10 +25,10 @@ from wirebayes.robot.mechanics.sag import sag_warnings_of_poses
 from wirebayes.robot.mechanics.winches import of_each_winch
 from wirebayes.robot.motion import home, inverse, plausible
 from wirebayes.robot.self_calibration import sensors
-from wirebayes.robot.self_calibration.another_weight import fault_notices
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
 from wirebayes.robot.self_calibration.equations import Holds, moved
 from wirebayes.robot.self_calibration.estimate import estimate, progress_of
+from wirebayes.robot.self_calibration.faults import fault_notices
 from wirebayes.robot.self_calibration.identified import Identified, identified, weakest_in_words
 from wirebayes.robot.self_calibration.mistaken import column_notices, tension_notices
 from wirebayes.robot.self_calibration.next_poses import NextPoses, next_poses
@@ -142,7 +142,7 @@ def calibration_report(
                 *_warnings(verdict),
                 *tension_notices(robot, session, readings),
                 *([] if verdict.usable else _columns(search)),
-                *fault_notices(robot, search.mass, search.at_fault),
+                *fault_notices(robot, search.mass, search.lean, search.at_fault),
                 *search.wires,
                 *wire_notices(robot, prior.line, session.duration_s, s, verdict.usable),
             ]

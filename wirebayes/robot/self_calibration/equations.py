@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wirebayes.numeric.typing import Bools, Floats
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.self_calibration.session import Session
 from wirebayes.robot.self_calibration.unknowns import Parts
 
@@ -137,3 +137,21 @@ def moved(robot: Robot, parts: Parts) -> Robot:
     # measures of length stay those of the file, so that units do not move with the unknowns
     changed.__dict__.update(span_m=robot.span_m, size_m=robot.size_m)
     return changed
+
+
+def by_carried(equations: Equations, robot: Robot, noise: Noise, wrench: Floats) -> Floats:
+    """How residuals ``(p, k, c)`` follow shares of further wrenches that the wires carry.
+
+    Parameters
+    ----------
+    equations : Equations
+    robot : Robot
+    noise : Noise
+    wrench : (c, d, p) array
+        N and N m, about the reference point.
+    """
+    holds, rows = equations.residual.shape
+    out = np.zeros((holds, rows, len(wrench)))
+    force = noise.balance * robot.mass_kg * GRAVITY
+    out[:, equations.rows["balance"]] = -wrench.T * robot.edge_scale[:, None] / force
+    return out

@@ -13,6 +13,7 @@ from wirebayes.result_warnings import Notice
 from wirebayes.robot.self_calibration.another_weight import OtherMass, other_mass
 from wirebayes.robot.self_calibration.equations import Holds
 from wirebayes.robot.self_calibration.estimate import estimate, progress_of
+from wirebayes.robot.self_calibration.leaning_frame import LeaningFrame, leaning_frame
 from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.residuals import lost, misfit, trust, usual_joint
 from wirebayes.robot.self_calibration.seeds import best, near_requests
@@ -51,6 +52,8 @@ class Searched:
         Which sensor would explain what contradicts; None where nothing does, or nothing that a sensor could.
     mass : OtherMass or None
         Of the platform, with which nothing would contradict.
+    lean : LeaningFrame or None
+        Of the robot's frame, with which nothing would contradict.
     wires : tuple of Notice
         How unlike what is stated wires would be with which nothing would contradict.
     inexact : bool
@@ -73,6 +76,7 @@ class Searched:
     too_near: bool = False
     closer: float = 1.0
     mass: OtherMass | None = None
+    lean: LeaningFrame | None = None
     wires: tuple[Notice, ...] = ()
 
 
@@ -104,7 +108,9 @@ def searched(
     found, holds, requested, closer = _rather_requests(found, holds, too_good, doubted, progress)
     p = trust(found)
     at_fault = _sensor_at_fault(found, holds, p, progress)
-    mass = _other_mass(found, holds, p, progress)
+    tells = _contradicts(found, p) and _carries(holds)
+    mass = other_mass(found, holds, progress_of(progress, "mass")) if tells else None
+    lean = leaning_frame(found, holds, progress_of(progress, "lean")) if tells else None
     wires = unlike_wires(found) if found.converged and p < SIGNIFICANT else ()
     inexact = unknowns.errors.joint_m == 0 and not (found.converged and p >= SIGNIFICANT)
     if inexact and misfit(found) < _GROSS:
@@ -114,7 +120,7 @@ def searched(
         if other.converged or not found.converged:
             found = other
     too_near = too_good and not requested
-    return Searched(found, holds, p, at_fault, inexact, requested, too_near, closer, mass, wires)
+    return Searched(found, holds, p, at_fault, inexact, requested, too_near, closer, mass, lean, wires)
 
 
 def _sensor_at_fault(found: RobotPosterior, holds: Holds, p: float, progress: Progress) -> Suspects | None:
@@ -122,12 +128,9 @@ def _sensor_at_fault(found: RobotPosterior, holds: Holds, p: float, progress: Pr
     return suspects(found, holds, progress_of(progress, "sensors")) if _contradicts(found, p) else None
 
 
-def _other_mass(found: RobotPosterior, holds: Holds, p: float, progress: Progress) -> OtherMass | None:
-    """Which mass of the platform would explain what contradicts; None where tensions that would tell were not read."""
-    read = np.isfinite(holds.tension_N).all(1).any()
-    if not read or not _contradicts(found, p):
-        return None
-    return other_mass(found, holds, progress_of(progress, "mass"))
+def _carries(holds: Holds) -> bool:
+    """Whether tensions were read that tell what the wires carry: of every wire, at a hold or more."""
+    return bool(np.isfinite(holds.tension_N).all(1).any())
 
 
 def _contradicts(found: RobotPosterior, p: float) -> bool:

@@ -48,6 +48,8 @@ class Suspects:
         Share of what the errors of all explain that this one alone explains.
     suffices : (w,) bool array
         Whether an error of this one alone leaves readings that do not contradict model and priors.
+    evidence : (w,) array
+        Log density of the readings where this one alone has an error; minus infinity where that was not tried.
     """
 
     bias_N: Floats
@@ -56,6 +58,7 @@ class Suspects:
     p_alone: Floats
     explains: Floats
     suffices: Bools
+    evidence: Floats
 
     @property
     def whole(self) -> Bools:
@@ -103,7 +106,7 @@ def weighed(bias_N: Floats, covariance: Floats, prior_sd_N: float) -> Suspects:
         alone = chdtrc(w - 1, left)
     share = np.clip(explained / max(total, 1e-300), 0.0, 1.0)
     by_chance = float(chdtrc(w, max(total, 0.0)))
-    return Suspects(score / own, own**-0.5, by_chance, alone, share, np.zeros(w, bool))
+    return Suspects(score / own, own**-0.5, by_chance, alone, share, np.zeros(w, bool), np.full(w, -np.inf))
 
 
 def suspects(found: RobotPosterior, holds: Holds, progress: ShareDone = lambda share: None) -> Suspects | None:
@@ -206,14 +209,16 @@ def _compared(screened: Suspects, found: RobotPosterior, gain: float, each: dict
     share = np.zeros(w)
     p_alone = np.zeros(w)
     suffices = np.zeros(w, bool)
+    evidence = np.full(w, -np.inf)
     for i, one in each.items():
+        evidence[i] = one.found.evidence
         own = _gain(found, one.found)
         bias[i] = one.bias_N[i]
         sd[i] = np.sqrt(one.covariance[i, i])
         share[i] = np.clip(own / gain, 0.0, 1.0)
         p_alone[i] = chdtrc(w - 1, max(gain - own, 0.0)) if w > 1 else 1.0
         suffices[i] = trust(one.found) >= max(SIGNIFICANT, _explained_from(found))
-    return Suspects(bias, sd, float(chdtrc(w, gain)), p_alone, share, suffices)
+    return Suspects(bias, sd, float(chdtrc(w, gain)), p_alone, share, suffices, evidence)
 
 
 def _explain_little(found: RobotPosterior, other: RobotPosterior) -> bool:

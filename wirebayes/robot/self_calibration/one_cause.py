@@ -1,0 +1,104 @@
+"""Fits with one cause more, which alone may explain what a calibration's readings contradict."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from wirebayes.numeric.linear_algebra import inv
+from wirebayes.numeric.typing import Floats
+from wirebayes.progress import ShareDone, shares_of
+from wirebayes.robot.self_calibration.equations import Holds, State
+from wirebayes.robot.self_calibration.estimate import estimate
+from wirebayes.robot.self_calibration.posterior import RobotPosterior
+from wirebayes.robot.self_calibration.residuals import trust
+from wirebayes.robot.self_calibration.trust import SIGNIFICANT
+from wirebayes.robot.self_calibration.unknowns import Unknowns
+
+_TRIES = 4  # searches: each place is found along straight lines from the one before
+_STILL = 0.5  # standard deviations: values that move by less are found
+_HELD_BY = 1e-3  # of the weight: balance that fails by more was not restored
+
+
+class Cause(Protocol):
+    """One or several values that are exact in a calibration, and may be wrong."""
+
+    @property
+    def usual(self) -> float:
+        """Standard deviation of each value before anything was read."""
+
+    def slopes(self, found: RobotPosterior) -> Floats:
+        """How the residuals ``(p, k, c)`` follow a change of the values."""
+
+    def changed(self, found: RobotPosterior, holds: Holds, by: Floats) -> tuple[Unknowns, Holds, State]:
+        """What is fitted, and from where, with values that have changed.
+
+        Parameters
+        ----------
+        found : RobotPosterior
+        holds : Holds
+        by : (c,) array
+            Change of the values.
+        """
+
+
+@dataclass(frozen=True)
+class Explained:
+    """A posterior in which nothing contradicts, and the covariance ``(c, c)`` of the values that it takes."""
+
+    found: RobotPosterior
+    covariance: Floats
+
+
+def explained_by(
+    cause: Cause, found: RobotPosterior, holds: Holds, progress: ShareDone = lambda share: None
+) -> Explained | None:
+    """The posterior with values of a cause with which readings and model do belong together; None where there is none.
+
+    Parameters
+    ----------
+    cause : Cause
+    found : RobotPosterior
+    holds : Holds
+    progress : function of a share between 0 and 1
+    """
+    for part in shares_of(progress, _TRIES):
+        change, covariance = _least_squares(found, cause.slopes(found), cause.usual)
+        if not _far(change, covariance):  # nor where the readings do not tell it
+            break
+        unknowns, holds, state = cause.changed(found, holds, change)
+        found = estimate(unknowns, holds, state, part)
+    else:
+        return None
+    if not found.converged or trust(found) < SIGNIFICANT or found.noise.balance > _HELD_BY:
+        return None
+    return Explained(found, covariance)
+
+
+def _far(change: Floats, covariance: Floats) -> bool:
+    """Whether values are still to move by a part of their standard deviations that matters."""
+    squared = change @ inv(covariance) @ change
+    return bool(squared > _STILL**2)
+
+
+def _least_squares(found: RobotPosterior, slopes: Floats, usual: float) -> tuple[Floats, Floats]:
+    """The change ``(c,)`` of further unknowns on which all residuals depend, and its covariance ``(c, c)``.
+
+    Parameters
+    ----------
+    found : RobotPosterior
+        At its mode.
+    slopes : (p, k, c) array
+        Of the residuals by them.
+    usual : float
+        Standard deviation of each before anything was read.
+    """
+    e = found.equations
+    by_own = np.einsum("pkc,pkh->phc", slopes, e.by_hold)
+    by_robot = np.einsum("pkc,pkm->mc", slopes, e.by_robot) + np.einsum("phc,phm->mc", by_own, found.by_robot)
+    alone = found.hold_covariance - found.by_robot @ found.covariance @ found.by_robot.mT
+    taken_up = np.einsum("pic,pij,pjd->cd", by_own, alone, by_own) + by_robot.T @ found.covariance @ by_robot
+    read = np.einsum("pkc,pkd->cd", slopes, slopes) - taken_up
+    covariance = inv(read + np.eye(len(read)) / usual**2)
+    score = np.einsum("pkc,pk->c", slopes, e.residual)
+    return -covariance @ score, covariance
