@@ -197,3 +197,22 @@ def test_what_moves_on_a_rig_is_the_displacement_where_nothing_else_is(tmp_path,
     with_displacement = [f"{row}\t{row.split()[-1]}7" for row in rows]
     beside = read(tmp_path, [f"millis\tload_g\t{name}\tdisplacement_um"], with_displacement, time_since="test")
     assert [hold.setting for hold in beside.experiment.holds] == [10.007, 20.007]
+
+
+def test_readings_without_a_clock_may_be_counted(tmp_path):
+    lines = [f"{i},{x},{y}" for i, (_, x, y) in enumerate(ROWS, start=1)]
+    header = ["No.,Displacement (mm),Force (N)"]
+    with pytest.raises(
+        Undecided, match=r'say which with --map "No.=time \[0.5 s\]" \(with the time between two readings'
+    ):
+        read(tmp_path, header, lines)
+    made = read(tmp_path, header, lines, mapping=("No.=time [30 s]",), time_since="test")
+    assert [list(hold.time_s[:3]) for hold in made.experiment.holds] == [[0.0, 30.0, 60.0]] * 3
+
+
+def test_columns_in_the_unit_of_what_is_missing_are_named_to_be_copied(tmp_path):
+    lines = [f"{time},{y + 3.2},{y},{x}" for time, x, y in ROWS]
+    header = ["t [s],Gross [N],Net [N],Position [mm]"]
+    with pytest.raises(Undecided, match=r'say which with --map "Gross \[N\]=tension" or --map "Net \[N\]=tension"$'):
+        read(tmp_path, header, lines)
+    assert_is_the_test(read(tmp_path, header, lines, mapping=("Net [N]=tension",)))

@@ -247,3 +247,29 @@ def test_a_column_for_each_hold_may_load_and_unload(tmp_path, settings, numbers)
 def test_settings_below_a_title_over_all_of_them_are_refused_with_what_to_write(tmp_path):
     with pytest.raises(InputError, match="with its unit: Time .s., 1 mm, 2 mm, 3 mm; and the unit of the readings in"):
         read(tmp_path, "time (s),scale (g) at screw turns", [",1,2,3", "0,10,20,30", "15,9,19,29", "30,8,18,28"])
+
+
+@pytest.mark.parametrize("name", ["", "Run {}: "])
+@pytest.mark.parametrize(("settings", "is_read"), [((1, 2, 3, 2), True), ((1, 2, 3, 1, 2, 3), False)])
+def test_runs_side_by_side_may_load_and_unload(tmp_path, name, settings, is_read):
+    runs = [name.format(i) for i in range(1, len(settings) + 1)]
+    header = ",,".join(f"{x} mm" for x in settings) + ",\n" + ",".join(f"{run}Time (s),{run}Force (N)" for run in runs)
+    rows = [",".join(f"{t},{5 * x - t / 100:.2f}" for x in settings) for t in TIMES]
+    if not is_read:  # again in the order of the first time: perhaps another specimen's
+        with pytest.raises(InputError):
+            read(tmp_path, header, rows)
+        return
+    (made,) = read(tmp_path, header, rows)
+    assert [hold.setting for hold in made.experiment.holds] == [float(x) for x in settings]
+    assert [hold.readings[1] for hold in made.experiment.holds] == [4.7, 9.7, 14.7, 9.7]
+
+
+def test_runs_of_which_nothing_says_what_was_set_are_refused_with_what_to_write(tmp_path):
+    header = ",".join(f"Run {i}: Time (s),Run {i}: Force (N)" for i in (1, 2, 3))
+    rows = [f"{t},{5 - t / 100},{t},{9 - t / 100},{t},{12 - t / 100}" for t in TIMES]
+    with pytest.raises(
+        InputError, match="found 3 columns of tension, .* and none of displacement, expected a row above"
+    ):
+        read(tmp_path, header, rows)
+    (made,) = read(tmp_path, "1 mm,,2 mm,,3 mm,\n" + header, rows)
+    assert [hold.setting for hold in made.experiment.holds] == [1.0, 2.0, 3.0]

@@ -18,6 +18,7 @@ from wirebayes.io.bench.header import (
     name_and_unit,
 )
 from wirebayes.io.bench.mapping import IGNORE, mapped_columns
+from wirebayes.io.bench.missing import check_settings_of_runs, missing_columns
 from wirebayes.io.bench.multiples import multiple_of_unit, unit_in_header
 from wirebayes.io.bench.numerals import is_count
 from wirebayes.io.bench.quantities import COMMON, OF_SAMPLE, ROLES, UNITS, Role, Unit, quantity_unit
@@ -27,10 +28,9 @@ from wirebayes.io.bench.two_clocks import best_clock, clock_of, parting
 from wirebayes.io.bench.two_units import finest_of_same
 from wirebayes.io.bench.undecided import Undecided
 from wirebayes.io.bench.unit_names import units_alone
-from wirebayes.io.bench.words import COUNTED, ERRORS, last_named, speaks_of, words_in
+from wirebayes.io.bench.words import ERRORS, last_named, speaks_of, words_in
 from wirebayes.sentences import listed
 
-_ONE_COUNT = "0.5 mm"  # stands for the length of a turn or a step, which only the user knows
 _NEEDED: tuple[Role, ...] = ("displacement", "time", "tension")
 
 
@@ -89,6 +89,8 @@ def understand(table: RawTable, mapping: Sequence[str]) -> Columns:
         except Undecided as question:
             open_questions[role] = question
     if open_questions:
+        if "tension" in open_questions and "displacement" not in (*roles, *open_questions):
+            check_settings_of_runs(table, [i for i in free if may_be(table, i, "tension")])
         first, *others = open_questions.values()
         raise Undecided(first.found, first.question, first.answers, others)
     return _complete(table, roles, free)
@@ -133,8 +135,11 @@ def _complete(table: RawTable, roles: Columns, free: Sequence[int]) -> Columns:
         by_units = units_alone(table, _NEEDED, used.union(free))
         if by_units:
             return roles | {role: _by_unit_alone(table, index, role) for role, index in by_units.items()}
+    for index in free:
+        if last_named(table.header[index]) == missing[0]:
+            column_as(table, index, missing[0])  # its unit is another quantity's, which is said
     unread = [i for i in free if i not in used]
-    raise _missing(table, free, unread, missing)
+    raise missing_columns(table, unread, missing)
 
 
 def _one(table: RawTable, likely: Sequence[int], role: Role) -> Column:
@@ -326,64 +331,3 @@ def _several(table: RawTable, likely: Sequence[int], role: Role, how: str = "") 
     return Undecided(
         f"{table.sheet.path}, line {table.header_line}: found {listed(names)}{how}", "which one to read", answers
     )
-
-
-def _option(table: RawTable, unread: Sequence[int], role: Role) -> str:
-    """What to write for a missing quantity: the column in a unit of it, if there is one; it is the user who decides."""
-    likely = [i for i in unread if quantity_unit(table.units[i], role) or name_and_unit(table.header[i], role).unit]
-    likely = likely or [i for i in unread if quantity_unit(table.header[i], role)]  # named by nothing but its unit
-    if len(likely) == 1:
-        return f'--map "{table.header[likely[0]]}={role}"'
-    counts = [i for i in unread if role == "displacement" and words_in(table.header[i]) & COUNTED]
-    if len(counts) == 1:
-        return f'--map "{table.header[counts[0]]}={role} [{_ONE_COUNT}]"'
-    return f'--map "HEADER={role} [{UNITS[role]}]"'
-
-
-def _missing(table: RawTable, free: Sequence[int], unread: Sequence[int], missing: Sequence[Role]) -> Undecided:
-    """The question which column is the first of the missing quantities, with the same question for the others."""
-    role, *more = missing
-    for index in free:
-        if last_named(table.header[index]) == role:
-            column_as(table, index, role)  # its unit is another quantity's, which is said
-    found = "found no column of"
-    names = [name for name in table.header if name]
-    in_doubt = _encoding_in_doubt(table, names)
-    if table.nameless:
-        found = "found numbers without a header, and no column of"
-        first_row = table.rows[0].cells
-        names = [f"{name} ({cell})" for name, cell in zip(names, first_row, strict=False)]
-    place = f"{table.sheet.path}, line {table.header_line}: {found}"
-    how = _how_to_say(table, unread, missing)
-    wanted = "one of each" if more else "one"
-    named = ", ".join(names)
-    message = f"{place} {listed(missing, 'or')} among {named}, expected {wanted}{how}{in_doubt}"
-    answers = {}
-    for i in unread:
-        header = table.header[i]
-        answers[f"--map {header}={role}"] = header
-    others = []
-    if more:
-        others.append(_missing(table, free, unread, more))
-    return Undecided(f"{place} {role}", f"which column is the {role}", answers, others, message)
-
-
-def _how_to_say(table: RawTable, unread: Sequence[int], missing: Sequence[Role]) -> str:
-    """How a user says which columns the missing quantities are."""
-    if not unread and missing == ["displacement"]:  # a record of tension over time
-        return "; to a hold at one displacement add a column with it, the same in every row"
-    options = " ".join(_option(table, unread, role) for role in missing)
-    if table.nameless:
-        options = options.replace("HEADER=", "N=")
-        return f"; say which with {options}, N the number of the column"
-    about_units = " (a unit only where the header has no unit)" if "HEADER=" in options else ""
-    about_counts = f" (with the length of one in place of {_ONE_COUNT})" if _ONE_COUNT in options else ""
-    return f"; say which with {options}{about_units}{about_counts}"
-
-
-def _encoding_in_doubt(table: RawTable, names: Sequence[str]) -> str:
-    """A sentence that names may look wrong, for they were read by a code page; empty where there is no doubt."""
-    encoding = table.sheet.encoding
-    if encoding in ("utf-8", "utf-8-sig") or " ".join(names).isascii():
-        return ""
-    return f"; the file is not UTF-8 and was read as {encoding.upper()}: if names look wrong, save it as UTF-8"

@@ -314,7 +314,7 @@ def _rows_of_hold(holds: Cut, hold: int) -> list[tuple[float, int, bool]]:
 def _sheet(path: Path, choices: Choices) -> Sheet:
     raw = read_raw(path)
     if raw.startswith(workbook.SIGNATURE):
-        return with_units_apart(workbook.sheet_of_workbook(path, raw, choices.sheet))
+        return with_units_apart(workbook.sheet_of_workbook(path, raw, choices.sheet, choices.decimal))
     if raw.startswith(workbook.OLD_EXCEL):
         raise InputError(f"{path}: found a workbook of Excel 2003 or older, expected xlsx or text; save it as xlsx")
     if choices.sheet is not None:

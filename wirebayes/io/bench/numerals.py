@@ -41,15 +41,17 @@ def decimal_sign(table: RawTable, columns: Sequence[int], stated: Decimal | None
         Every number with a comma could be thousands or a fraction.
     """
     if stated is not None:
-        return stated
+        return "point" if table.sheet.lettered else stated  # cells of text in a workbook were read with it
     signed = []
     for row in table.rows:
         for column in columns:
             cell = row.cell(column)
             if ("," in cell or "." in cell) and is_number(cell):
                 signed.append((row.line, column, cell))
+    if table.sheet.lettered:  # numbers of a workbook have a point whatever was typed as text
+        signed = [found for found in signed if "," in found[2]]
     for sign in _SIGNS:
-        if any(_proves(cell, sign) for _, _, cell in signed):
+        if any(proves(cell, sign) for _, _, cell in signed):
             return sign
     # what is left could be grouped thousands: trusted only for a point that no habit of commas makes doubtful
     semicolons = "semicolon" in table.sheet.described
@@ -57,8 +59,6 @@ def decimal_sign(table: RawTable, columns: Sequence[int], stated: Decimal | None
     if doubtful is None:
         return "point"
     line, column, cell = doubtful
-    if table.sheet.lettered and "," not in cell:
-        return "point"
     sign = "comma" if "," in cell else "point"
     other = _OTHER[sign]
     whole, fraction = plain_number(cell, other), plain_number(cell, sign)
@@ -131,8 +131,16 @@ def is_count(cell: str) -> bool:
     return bool(_COUNT.fullmatch(cell))
 
 
-def _proves(cell: str, decimal: Decimal) -> bool:
-    """Whether a number can be read with this decimal sign only."""
+def proves(cell: str, decimal: Decimal) -> bool:
+    """Whether a number can be read with this decimal sign only.
+
+    Parameters
+    ----------
+    cell : str
+        A number in any country's writing.
+    decimal : {"point", "comma"}
+        The decimal sign.
+    """
     sign, other = _SIGNS[decimal], _SIGNS[_OTHER[decimal]]
     if sign in cell and other in cell:
         return cell.rindex(sign) > cell.rindex(other)

@@ -14,6 +14,7 @@ _ALIKE = 3  # rows that begin the readings: a preamble has a line of numbers now
 LONGEST_HEADER = 200  # characters: names and units take a few words, prose is no header
 LONGEST_MARK = 2  # characters: a number or a letter says nothing without the word specimen
 _NUMBER_BEFORE = re.compile(r"^±?[-+−]?\d+([.,]\d+)?\s*")
+_WORD = re.compile(r"[^\W\d_]+")
 _LAST_WORD = re.compile(r"[^\s_/\[\]()]+")
 _SETTINGS_IN_HEADER = (
     "; what was set in the hold of each column stands in the header, beside the time and each with its unit: "
@@ -146,10 +147,28 @@ def find_table(sheet: Sheet) -> RawTable:
     header = _padded(head.cells, width)
     names = _padded(others[-1].cells, width) if others else ()
     body = tuple(row for row in rows[first:] if not row.comment)
+    header, names = _with_names_from_above(header, names, shown)
     _check_width(sheet, head, body, width)
     _check_gaps(sheet, head, body)
     _check_headers_repeat(sheet, rows[:first], head, body)
     return RawTable(sheet, header, _padded(units, width), body, head.line, names)
+
+
+def _with_names_from_above(
+    header: Sequence[str], above: Sequence[str], readings: Sequence[SheetRow]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Header and the row above it, with a name that stands there for both of them, as in a merged cell, in the header.
+
+    The row then names two columns or more, and this one a quantity; a single cell is a title.
+    """
+    if sum(map(bool, above)) < 2:
+        return tuple(header), tuple(above)
+    names, left = [*header], [*above]
+    for i, name in enumerate(above):
+        has_values = any(is_value(row.cell(i)) for row in readings)
+        if has_values and not header[i] and any(map(speaks_of_a_quantity, _WORD.findall(name))):
+            names[i], left[i] = name, ""
+    return tuple(names), tuple(left)
 
 
 def _padded(cells: Sequence[str], width: int) -> tuple[str, ...]:

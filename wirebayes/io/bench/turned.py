@@ -89,23 +89,26 @@ def row_for_each_reading(table: RawTable) -> RawTable:
 
 def _one_below_the_other(table: RawTable) -> RawTable:
     """Holds that stand side by side under what was set in them, below each other; else the table itself."""
-    columns = _under_labels(table)
-    if len(columns) < 2 or not all(map(may_state_a_setting, columns)):
+    labels, columns = _under_labels(table)
+    if len(columns) < 2 or not all(map(may_state_a_setting, labels)):
         return table
-    names = {tuple((table.header[i], table.units[i]) for i in own) for own in columns.values()}
+    names = {tuple((_without_numbers(table.header[i]), table.units[i]) for i in own) for own in columns}
     if len(names) > 1:
         return table
-    header, units = zip(*names.pop(), strict=True)
+    header = tuple(table.header[i] for i in columns[0])
+    units = tuple(table.units[i] for i in columns[0])
     of_one = replace(table, header=header, units=units)
     missing = lacking(of_one, ())
     if len(missing) != 1:
         return table
     (set_role,) = missing
-    settings = _settings_of(list(columns), set_role)
+    settings = _settings_of(labels, set_role)
     if settings is None:
         return table
     unit, numbers = settings
-    rows = _rows_under(table, [*columns.values()], numbers)
+    if len(set(numbers)) < len(numbers) and not _go_back(set_role, numbers):
+        return table
+    rows = _rows_under(table, columns, numbers)
     sheet = table.sheet.also("holds side by side")
     all_names = ("hold", set_role, *header)
     all_units = ("", unit, *units)
@@ -123,15 +126,28 @@ def _settings_of(labels: list[str], role: Role) -> tuple[str, list[str]] | None:
     return in_one_unit(settings, role)
 
 
-def _under_labels(table: RawTable) -> dict[str, list[int]]:
-    """The columns under each label of the row above the header, which stands over the first of them or over all."""
-    columns: dict[str, list[int]] = {}
+def _under_labels(table: RawTable) -> tuple[list[str], list[list[int]]]:
+    """The labels of the row above the header, each over the first of its columns or over all; and these columns."""
+    labels: list[str] = []
+    columns: list[list[int]] = []
     last = ""
     for i, (label, name) in enumerate(zip(table.above, table.header, strict=False)):
-        last = label or last
+        if label and (label != last or _is_named(table, name, columns[-1])):
+            labels.append(label)
+            columns.append([])
+            last = label
         if last and name:
-            columns.setdefault(last, []).append(i)
-    return columns
+            columns[-1].append(i)
+    return labels, columns
+
+
+def _is_named(table: RawTable, name: str, columns: Sequence[int]) -> bool:
+    """Whether one of some columns has a name, but for its numbers."""
+    return any(_without_numbers(table.header[i]) == _without_numbers(name) for i in columns)
+
+
+def _without_numbers(name: str) -> str:
+    return re.sub(r"\d+", "#", name)
 
 
 def _rows_under(table: RawTable, columns: list[list[int]], settings: list[str]) -> tuple[SheetRow, ...]:

@@ -1,5 +1,6 @@
 """Two interpretations are possible, and nothing in the file decides: a person may choose, a program gets an error."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -96,4 +97,5 @@ class Undecided(InputError):
 def quoted(option: str) -> str:
     """An option as a shell takes it."""
     name, _, value = option.partition(" ")
-    return f'{name} "{value}"' if name == "--map" else option
+    is_one_word = name != "--map" and re.fullmatch(r"[\w.+-]*", value)
+    return option if is_one_word else f'{name} "{value}"'

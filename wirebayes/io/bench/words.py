@@ -35,7 +35,7 @@ WORDS: dict[Role, tuple[str, ...]] = {
         "time", "elapsed", "millis", "micros", "seconds", "minutes", "hours", "timestamp", "clock", "stopwatch",
         "zeit", "uhrzeit",
         "zeitpunkt", "sekunden", "minuten", "stunden", "temps", "duree", "heure",
-        "tiempo", "tempo", "hora", "ora", "orario", "tijd", "czas", "tid", "aika", "cas", "zaman",
+        "tiempo", "tempo", "hora", "ora", "orario", "tijd", "czas", "tid", "aika", "cas", "zaman", "saat",
         "χρονοσ",
         "время", "時間", "时间", "時刻", "시간",
     ),

@@ -2,21 +2,23 @@
 
 import io
 import warnings
+from collections.abc import Collection, Mapping
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
 from typing import Any
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench.cell_units import bare
-from wirebayes.io.bench.sheet import Sheet, SheetRow, is_value
-from wirebayes.io.bench.undecided import Undecided
+from wirebayes.io.bench.numerals import plain_number, proves
+from wirebayes.io.bench.sheet import Sheet, SheetRow, is_number, is_value
+from wirebayes.io.bench.undecided import Decimal, Undecided
 from wirebayes.strict.hint import hint
 
 SIGNATURE = b"PK\x03\x04"
 OLD_EXCEL = b"\xd0\xcf\x11\xe0"
 
 
-def sheet_of_workbook(path: Path, raw: bytes, chosen: str | None) -> Sheet:
+def sheet_of_workbook(path: Path, raw: bytes, chosen: str | None, decimal: Decimal | None) -> Sheet:
     """The cells of the sheet that holds readings, or of the one named.
 
     Raises
@@ -32,8 +34,10 @@ def sheet_of_workbook(path: Path, raw: bytes, chosen: str | None) -> Sheet:
         Content of the file.
     chosen : str or None
         Name of a sheet; left out, the only one with readings is taken.
+    decimal : {"point", "comma"} or None
+        The decimal sign of numbers that stand in cells of text, if the user says it.
     """
-    rows = _rows_of_sheets(path, raw)
+    rows = _rows_of_sheets(path, raw, decimal)
     if chosen is not None:
         if chosen not in rows:
             names = list(rows)
@@ -54,7 +58,7 @@ def sheet_of_workbook(path: Path, raw: bytes, chosen: str | None) -> Sheet:
     return Sheet(path, rows[only], lettered=True, described=f"sheet {only}")
 
 
-def _rows_of_sheets(path: Path, raw: bytes) -> dict[str, tuple[SheetRow, ...]]:
+def _rows_of_sheets(path: Path, raw: bytes, decimal: Decimal | None) -> dict[str, tuple[SheetRow, ...]]:
     """The rows of each sheet of a workbook."""
     import openpyxl
 
@@ -62,7 +66,7 @@ def _rows_of_sheets(path: Path, raw: bytes) -> dict[str, tuple[SheetRow, ...]]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of styles and extensions that do not concern cells
             book = openpyxl.load_workbook(io.BytesIO(raw), read_only=True, data_only=True)
-            return {sheet.title: _rows(sheet) for sheet in book.worksheets}
+            return {sheet.title: _rows(sheet, decimal) for sheet in book.worksheets}
     except Exception as error:  # whatever a damaged archive raises
         found = f"no workbook that can be opened ({type(error).__name__})"
         raise InputError(f"{path}: found {found}, expected xlsx or text; save it as CSV") from error
@@ -72,10 +76,17 @@ def _measured(row: SheetRow) -> bool:
     return sum(is_value(bare(cell)) for cell in row.filled) >= 2
 
 
-def _rows(sheet: Any) -> tuple[SheetRow, ...]:
+def _rows(sheet: Any, decimal: Decimal | None) -> tuple[SheetRow, ...]:
+    """The rows of a sheet that hold something.
+
+    Numbers that were typed as text become numbers like those beside them, which have no sign of their own.
+    """
+    cells = [[*row] for row in sheet.iter_rows()]
+    typed = {cell.value.strip() for row in cells for cell in row if isinstance(cell.value, str)}
+    with_comma = _numbers_with_comma(typed, decimal)
     out = []
-    for line, cells in enumerate(sheet.iter_rows(), start=1):
-        texts = [_text(cell) for cell in cells]
+    for line, of_line in enumerate(cells, start=1):
+        texts = [_text(cell, with_comma) for cell in of_line]
         while texts and not texts[-1]:
             texts.pop()
         if not texts:
@@ -87,7 +98,21 @@ def _rows(sheet: Any) -> tuple[SheetRow, ...]:
     return tuple(out)
 
 
-def _text(cell: Any) -> str:
+def _numbers_with_comma(typed: Collection[str], decimal: Decimal | None) -> dict[str, str]:
+    """Numbers among cells of text whose decimal sign is a comma, with a point in its place.
+
+    One that may have thousands in place of a fraction is among them if others show a comma, and none a point.
+    """
+    if decimal == "point":
+        return {}
+    numbers = [text for text in typed if is_number(text)]
+    show = [text for text in numbers if proves(text, "comma")]
+    all_of_them = decimal == "comma" or (show and not any(proves(text, "point") for text in numbers))
+    read = {text: plain_number(text, "comma") for text in (numbers if all_of_them else show)}
+    return {text: number for text, number in read.items() if number is not None}
+
+
+def _text(cell: Any, with_comma: Mapping[str, str]) -> str:
     value = cell.value
     if value is None:
         return ""
@@ -105,4 +130,5 @@ def _text(cell: Any) -> str:
         return value.isoformat(sep=" ")
     if isinstance(value, date | time):
         return value.isoformat()
-    return " ".join(str(value).split())  # headers are broken into lines now and then
+    text = " ".join(str(value).split())  # headers are broken into lines now and then
+    return with_comma.get(text, text)
