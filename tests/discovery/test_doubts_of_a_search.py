@@ -2,7 +2,8 @@
 
 import pytest
 
-from wirebayes.discovery.doubts import likely_beside, samples_may_differ
+from wirebayes.discovery.apart import APART
+from wirebayes.discovery.doubts import likely_beside, samples_differ
 from wirebayes.discovery.settings import REMAINS
 
 ABOVE, BELOW = REMAINS + 0.01, REMAINS - 0.01
@@ -42,18 +43,9 @@ def test_it_is_said_where_the_final_model_lacks_it(changes, said):
     assert bool(likely_beside(_found(**changes))) is said
 
 
-@pytest.mark.parametrize(
-    ("verdict", "samples", "said"),
-    [
-        ("unknown", ["a", "b"], True),
-        ("partial", ["a", "b"], True),
-        ("named", ["a", "b"], False),
-        ("nothing-missing", ["a", "b"], False),
-        ("unknown", ["a"], False),
-    ],
-)
-def test_what_has_no_name_may_be_that_samples_differ(verdict, samples, said):
+@pytest.mark.parametrize(("p", "said"), [(0.002, True), (APART, True), (APART + 0.002, False), (None, False)])
+def test_that_samples_differ_is_said_where_they_do(p, said):
     """Four plain specimens whose k1 differed by 4 % were told that something unknown is missing."""
-    notices = samples_may_differ(_found(verdict=verdict), samples)
-    assert [notice.kind for notice in notices] == ["left-out"] * said
-    assert all("the 2 samples differ" in n.text and "(--experiment a)" in n.text for n in notices)
+    notices = samples_differ(p, ["a", "b"])
+    assert [notice.kind for notice in notices] == ["incomplete"] * said
+    assert all("the 2 samples differ (p" in n.text and "(--experiment a)" in n.text for n in notices)

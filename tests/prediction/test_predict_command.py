@@ -240,7 +240,7 @@ def test_what_speaks_against_the_fit_is_said_again(
     (folder / "summary.json").write_text(json.dumps({"model_check": {"passed": True, "p": 0.3}} | summary))
     assert cli.main(asked) == 0 and "warning" not in capsys.readouterr().err
     (folder / "summary.json").write_text(
-        json.dumps({"model_check": {"passed": False, "p": 0.0031, "simulations": 334}} | summary)
+        json.dumps({"model_check": {"passed": False, "p": 0.0031, "alpha": 0.04, "simulations": 334}} | summary)
     )
     with h5py.File(folder / "posterior.nc", "r+") as file:
         file["posterior"].attrs["converged"] = 0

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from wirebayes.results.read_back import _found_missing
+from wirebayes.results.read_back import _failed_in_words, _found_missing
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,13 @@ def test_a_plain_model_is_doubted_where_a_search_found_something_missing(verdict
 
 
 @pytest.mark.parametrize(
-    ("model", "verdict", "kinds"), [("final", "named", ["incomplete"]), ("plain", "named", ["model-check"])]
+    ("model", "verdict", "kinds"),
+    [
+        ("final", "named", ["incomplete"]),
+        ("plain", "named", ["model-check"]),
+        ("final", "nothing-missing", ["incomplete"]),  # of samples that differ
+        ("plain", "nothing-missing", ["incomplete"]),
+    ],
 )
 def test_a_final_model_is_doubted_where_something_more_is_likely(model, verdict, kinds, tmp_path):
     likely = {"kind": "incomplete", "text": "likely missing too: the readings drift"}
@@ -42,3 +48,11 @@ def test_a_final_model_is_doubted_where_something_more_is_likely(model, verdict,
 
 def test_a_fit_that_no_search_is_part_of_is_not_doubted(tmp_path):
     assert _found_missing("wire", tmp_path / "wire" / "plain") == []
+
+
+@pytest.mark.parametrize(
+    ("p", "said"), [(0.01, "the model fitted to wire does not"), (0.5, "wire was fitted at once with")]
+)
+def test_a_failed_check_says_whether_samples_differ_or_the_model_fails(p, said):
+    check = {"passed": False, "p": p, "alpha": 0.04, "p_alike": 0.002, "simulations": 999}
+    assert _failed_in_words(check, "wire").startswith(said)

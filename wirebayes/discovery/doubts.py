@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 
+from wirebayes.discovery.apart import APART, REFITTED
 from wirebayes.discovery.settings import REMAINS
 from wirebayes.json_files.discovery import SharedFindings
 from wirebayes.result_warnings import Notice
+from wirebayes.sentences import p_in_words
 
-_UNNAMED = ("unknown", "partial")
 _LACKING = ("named", "ambiguous")  # of the other verdicts the final model has a discrepancy, or nothing is missing
 
 
@@ -40,20 +41,23 @@ def likely_beside(found: SharedFindings) -> list[Notice]:
     return [Notice("incomplete", text)]
 
 
-def samples_may_differ(found: SharedFindings, samples: Sequence[str]) -> list[Notice]:
-    """A notice that what has no name may be a difference between samples, which a search takes to be alike.
+def samples_differ(p: float | None, samples: Sequence[str]) -> list[Notice]:
+    """A notice that samples differ which a search takes to be alike.
+
+    Four plain specimens whose stiffness differed by 4 % were told that something unknown is missing.
 
     Parameters
     ----------
-    found : dict
-        Of one experiment, as in ``discovery.json``.
+    p : float or None
+        Probability of samples that seem to differ as much, were they alike; None of a single one.
     samples : sequence of str
-        Those of its material.
+        Those of one material.
     """
-    if found["verdict"] not in _UNNAMED or len(samples) == 1:
+    if p is None or p > APART:
         return []
     text = (
-        f"what has no name may be that the {len(samples)} samples differ: k1, B, U, k2 and N are taken to be those of "
-        f"one line in all of them; search each by itself (--experiment {samples[0]})"
+        f"the {len(samples)} samples differ ({p_in_words(p, REFITTED)}), and the search takes k1, B, U, k2 and N to "
+        "be those of one line in all of them: what it finds may be their difference, and intervals and predictions can "
+        f"be wrong by more than they say; search each by itself (--experiment {samples[0]})"
     )
-    return [Notice("left-out", text)]
+    return [Notice("incomplete", text)]

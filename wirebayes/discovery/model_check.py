@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wirebayes.discovery.apart import APART, REFITTED, p_alike
 from wirebayes.discovery.global_test import examine
 from wirebayes.discovery.screening import TWO
 from wirebayes.discovery.settings import ALPHA, SIMULATIONS
@@ -57,6 +58,8 @@ class ModelCheck:
         Whether the fitted model has effects.
     samples : int
         To how many samples it was fitted at once.
+    p_alike : float or None
+        Probability of samples that seem to differ as much, were their parameters the same; None of one sample.
     """
 
     p: float | None
@@ -67,11 +70,17 @@ class ModelCheck:
     reason: str = ""
     with_effects: bool = False
     samples: int = 1
+    p_alike: float | None = None
 
     @property
     def passed(self) -> bool | None:
         """Whether the model may stand; None where it was not checked."""
-        return None if self.p is None else self.p > self.alpha
+        return None if self.p is None else self.p > self.alpha and not self.samples_differ
+
+    @property
+    def samples_differ(self) -> bool:
+        """Whether samples that were fitted at once do not have the same parameters."""
+        return self.p_alike is not None and self.p_alike <= APART
 
     @property
     def sentence(self) -> str:
@@ -105,34 +114,36 @@ class ModelCheck:
         )
 
     def _failed_in_words(self) -> str:
+        if self.p is not None and self.p > self.alpha:
+            return f"The {self._samples_in_words()}: parameters and predictions {_WRONG}; {_EACH}"
         model = "The model with these effects" if self.with_effects else "The plain model"
         directions = ", ".join(map(spoken, self.surprising))
+        samples = f", and the {self._samples_in_words()}; {_EACH}" if self.samples_differ else ""
         return (
             f"{model} does not describe the readings ({self._p_in_words}; it fails below {self.alpha:.2g}): "
-            "parameters and predictions can be wrong by more than their intervals. "
-            f"The readings deviate most towards {directions}{self._samples_in_words()}"
+            f"parameters and predictions {_WRONG}. The readings deviate most towards {directions}{samples}"
         )
 
     def _samples_in_words(self) -> str:
-        """What else may be the reason where several samples were fitted at once."""
-        if self.samples == 1:
-            return ""
-        return (
-            f"; or the {self.samples} samples differ, where one set of parameters was fitted to all of them: fits of "
-            "each by itself show it"
-        )
+        sure = p_in_words(self.p_alike or 0.0, REFITTED)
+        return f"{self.samples} samples differ, where one set of parameters was fitted to all of them ({sure})"
 
     def to_dict(self) -> ModelCheckResult:
         """Plain values for JSON."""
         return {
             "passed": self.passed,
             "p": self.p,
+            "p_alike": self.p_alike,
             "alpha": self.alpha,
             "simulations": self.simulations,
             "most_surprising": list(self.surprising),
             "gross_errors": list(self.gross_errors),
             "sentence": self.sentence,
         }
+
+
+_WRONG = "can be wrong by more than their intervals"
+_EACH = "fits of each by itself show in what"
 
 
 def level(tests: int) -> float:
@@ -173,6 +184,8 @@ def check_model(
         gate = examine([block], kinds, simulations or SIMULATIONS, rng, alpha=alpha, parallel_map=parallel_map)
     except InputError:
         return unchecked(reason="no further effect could show in these holds")
+    of_samples = np.random.default_rng(seed_of(seed, "samples"))
+    (alike,) = parallel_map(p_alike, gate.blocks, [of_samples])
     p = gate.test.p
     names = directions(gate.test.surprises)
     failed = p <= alpha
@@ -185,6 +198,7 @@ def check_model(
         "",
         bool(effects),
         len(job.experiments),
+        alike,
     )
 
 

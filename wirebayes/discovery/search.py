@@ -15,7 +15,8 @@ from numpy.random import Generator
 
 from wirebayes.discovery import gross_errors, power, residual_patterns, shrinking
 from wirebayes.discovery.alternatives import Alternative, alternatives
-from wirebayes.discovery.doubts import likely_beside, samples_may_differ
+from wirebayes.discovery.apart import p_alike
+from wirebayes.discovery.doubts import likely_beside, samples_differ
 from wirebayes.discovery.families import block_ratio, called, family_names, family_sentence
 from wirebayes.discovery.global_test import Gate, examine
 from wirebayes.discovery.held_out import LeftOut
@@ -113,6 +114,7 @@ def investigate(
     answers = [answer_material(gate, past, i, where[i], left_out, rng, parallel_map) for i in range(len(gate.blocks))]
     models = _models(past, answers, gate.blocks)
     concluded(models)
+    of_samples = _differing_samples(models.final, seed, parallel_map)
     alike = power.similarity(expansions, gate.trials, [block_ratio(f) for f in models.final])
     out: dict[str, ExperimentFindings] = {}
     for i, answer in enumerate(answers):
@@ -121,7 +123,7 @@ def investigate(
         own = _own_reports(gate, i, answer, left_out, rng, parallel_map)
         for e in gate.blocks[i].experiments:
             common = _common(answers, i, e, gate.blocks, gate.test, where[i], alike)
-            out[e.name] = _with_doubts({**common, **ahead, **own[e.name]}, gate.blocks[i].names)
+            out[e.name] = _with_doubts({**common, **ahead, **own[e.name]}, of_samples[i])
     report("held-out holds", len(answers), len(answers))
     return Investigation(
         models.final,
@@ -194,9 +196,16 @@ def _own_reports(
     return reports
 
 
-def _with_doubts(found: ExperimentFindings, samples: Sequence[str]) -> ExperimentFindings:
+def _differing_samples(final: Sequence[LaplaceFit], seed: int, parallel_map: ParallelMap) -> list[list[Notice]]:
+    """What is said of each material whose samples differ."""
+    each = np.random.default_rng(seed_of(seed, "samples")).spawn(len(final))
+    found = parallel_map(p_alike, final, each)
+    return [samples_differ(p, block.names) for p, block in zip(found, final, strict=True)]
+
+
+def _with_doubts(found: ExperimentFindings, of_samples: Sequence[Notice]) -> ExperimentFindings:
     """What is said of an experiment, and among its warnings what the final model lacks or takes to be alike."""
-    doubts = [*likely_beside(found), *samples_may_differ(found, samples)]
+    doubts = [*likely_beside(found), *of_samples]
     found["warnings"] = to_json([*doubts, *from_json(found["warnings"])])
     return found
 

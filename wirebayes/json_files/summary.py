@@ -93,6 +93,7 @@ class ModelCheckResult(TypedDict):
 
     passed: bool | None
     p: float | None
+    p_alike: float | None
     alpha: float
     simulations: int
     most_surprising: list[str]

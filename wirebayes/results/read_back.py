@@ -17,6 +17,7 @@ from wirebayes.effects.unknown import Discrepancy
 from wirebayes.errors import InputError
 from wirebayes.io.readings import READ, SET
 from wirebayes.io.run_folder import read_json, stored_results
+from wirebayes.json_files.summary import ModelCheckResult
 from wirebayes.model.prior import Prior
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import LENGTH_EXPONENT, Sample, at_length
@@ -130,13 +131,20 @@ def _doubts(groups: Mapping[str, Group], name: str, summary: Path) -> tuple[Noti
         out.append(Notice("not-converged", text))
     check = read_json(summary).get("model_check") if summary.is_file() else None
     if check and check["passed"] is False:
-        sure = p_in_words(check["p"], check["simulations"])
-        text = (
-            f"the model fitted to {name} does not describe its readings ({sure}): what follows from it "
-            "can be wrong by more than is said; wirebayes discover looks for what is missing"
-        )
-        out.append(Notice("model-check", text))
+        out.append(Notice("model-check", _failed_in_words(check, name)))
     return (*out, *_found_missing(name, summary.parent))
+
+
+def _failed_in_words(check: ModelCheckResult, name: str) -> str:
+    """What a failed check says against using the fit."""
+    wrong = "what follows from it can be wrong by more than is said"
+    if check["p"] is not None and check["p"] > check["alpha"]:
+        return f"{name} was fitted at once with samples that differ from it: {wrong}; fit each by itself"
+    sure = p_in_words(check["p"] or 0.0, check["simulations"])
+    return (
+        f"the model fitted to {name} does not describe its readings ({sure}): {wrong}; wirebayes discover looks for "
+        "what is missing"
+    )
 
 
 def _found_missing(name: str, folder: Path) -> list[Notice]:
@@ -145,9 +153,9 @@ def _found_missing(name: str, folder: Path) -> list[Notice]:
     if folder.name not in ("plain", "final") or not file.is_file():
         return []
     report = read_json(file)["experiments"].get(name)
-    if report is None or report["verdict"] == "nothing-missing":
+    if report is None:
         return []
-    if folder.name == "final":
+    if folder.name == "final" or report["verdict"] == "nothing-missing":
         return [notice.of(name) for notice in from_json(report["warnings"]) if notice.kind == "incomplete"]
     sure = p_in_words(report["p_global"], report["p_simulations"])
     text = (
