@@ -1,4 +1,4 @@
-"""Draws of a fitted line in the form that the robot takes: of one posterior, or of several specimens' together."""
+"""Draws of a fitted line in the form that the robot takes: of a posterior, of models undecided, of specimens."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -12,8 +12,10 @@ from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.means import geometric_mean
 from wirebayes.numeric.typing import Floats
 from wirebayes.results import read_back
+from wirebayes.results.mixture import members_of
 from wirebayes.results.read_back import Stored
 from wirebayes.robot.mechanics.draws import CORE, LENGTH_EXPONENT, WireDraws, material
+from wirebayes.robot.mechanics.undecided_models import draws_of_each, models_together, that_go_together
 from wirebayes.views.posterior import POSTERIOR
 from wirebayes.wire.effect import Typical
 
@@ -40,7 +42,39 @@ def read_wires(folder: Path, count: int, experiment: str | None = None, own_effe
     below = sorted(str(path.parent) for path in folder.glob("*/**/posterior.nc"))
     if below and not (folder / POSTERIOR).is_file():
         raise InputError(f"{folder}: found no posterior.nc in it, expected one of {', '.join(below)}")
-    return usable_draws(read_back.load_posterior(folder, experiment, own_effects), str(folder), count)
+    models = [
+        (probability, read_back.load_posterior(place, experiment, own_effects))
+        for probability, place in members_of(folder)
+    ]
+    return draws_of_models(models, str(folder), count)
+
+
+def draws_of_models(models: Sequence[tuple[float, Stored]], where: str, count: int) -> WireDraws:
+    """Draws of a line, of each model that its readings leave possible as many as it is probable.
+
+    Parameters
+    ----------
+    models : sequence of (probability, Stored)
+        The final model first, as `wirebayes.results.mixture.members_of` lists them.
+    where : str
+        For the message, if a posterior cannot be used.
+    count : int
+        Largest number of draws, of all together.
+
+    Raises
+    ------
+    InputError
+        If the fit took every hold by itself.
+    """
+    every = [usable_draws(stored, where, len(stored.draws["k1"])) for _, stored in models]
+    kept = that_go_together(every)
+    probabilities = np.array([models[place][0] for place in kept])
+    available = [every[place].count for place in kept]
+    few = []
+    for place, share in zip(kept, draws_of_each(probabilities, available, count), strict=True):
+        if share > 0:
+            few.append(every[place].part(evenly(every[place].count, share)))
+    return models_together(few)
 
 
 def usable_draws(stored: Stored, where: str, count: int) -> WireDraws:

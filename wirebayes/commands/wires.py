@@ -12,11 +12,12 @@ import numpy as np
 
 from wirebayes._version import __version__
 from wirebayes.commands.options import check_whole
-from wirebayes.commands.predict import one_of
-from wirebayes.commands.wire_draws import draws_of_specimens, read_wires, usable_draws
+from wirebayes.commands.predict import one_of, stored_posteriors
+from wirebayes.commands.wire_draws import draws_of_models, draws_of_specimens, read_wires
 from wirebayes.effects import source_of
 from wirebayes.errors import InputError
 from wirebayes.json_files.plain import plain
+from wirebayes.results.mixture import members_of
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, lines_of, stated_line
@@ -69,18 +70,27 @@ def posterior_of(wires: Wires | None, experiment: str | None) -> Path | str:
     if _several(wires):
         return hash_of({name: str(_content_of(line, experiment)) for name, line in wires.items()})
     if _is_sample(wires):
-        return str(_content_of(wires, experiment))
-    return folder_of(wires, experiment) / POSTERIOR
+        return _content_of(wires, experiment)
+    folder = folder_of(wires, experiment)
+    return _content_of_models(folder) if len(members_of(folder)) > 1 else folder / POSTERIOR
 
 
 def _content_of(line: Specimens, experiment: str | None) -> str:
     """What tells the posteriors of a line from others."""
     if not _is_sample(line):
-        return content_hash(folder_of(line, experiment) / POSTERIOR)
+        return _content_of_models(folder_of(line, experiment))
     each = {}
     for i, one in enumerate(line):
         each[str(i)] = content_hash(folder_of(one, experiment) / POSTERIOR)
     return hash_of(each)
+
+
+def _content_of_models(folder: Path) -> str:
+    """What tells a posterior from others, with the models that are undecided beside it."""
+    models = members_of(folder)
+    if len(models) == 1:
+        return content_hash(folder / POSTERIOR)
+    return hash_of({content_hash(place / POSTERIOR): probability for probability, place in models})
 
 
 def _is_sample(wires: Wires) -> TypeGuard[Sequence[Line]]:
@@ -140,14 +150,10 @@ def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effect
     if _is_sample(wires):
         folders = [folder_of(line, experiment) for line in wires]
         return draws_of_specimens(folders, count, experiment, own_effects)
-    if isinstance(wires, Findings):
-        wires = wires.final
-    if isinstance(wires, Posteriors):
-        wires = one_of(wires, experiment)
-    if isinstance(wires, Posterior):
-        stored = wires.stored(experiment)
-        return usable_draws(stored, wires.name, count)
     folder = folder_of(wires, experiment)
+    if isinstance(wires, Posterior | Posteriors | Findings):
+        models = stored_posteriors(wires, experiment, None, own_effects)
+        return draws_of_models(models, str(folder), count)
     return read_wires(folder, count, experiment, own_effects)
 
 

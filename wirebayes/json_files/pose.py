@@ -14,6 +14,13 @@ class Specimens(TypedDict):
     spread: dict[str, Quantiles]
 
 
+class ModelShare(TypedDict):
+    """A model that the readings of a line leave possible: its effects, and which share of the draws is of it."""
+
+    effects: list[str]
+    share: float
+
+
 class WiresUsed(TypedDict):
     """Which posterior the answer is for; `legs` has the line of each wire."""
 
@@ -26,6 +33,7 @@ class WiresUsed(TypedDict):
     legs: list[str]
     lines: list[str]
     specimens: NotRequired[dict[str, Specimens]]
+    undecided: NotRequired[dict[str, list[ModelShare]]]  # of lines whose draws are of several models
 
 
 class TensionDistribution(TypedDict):

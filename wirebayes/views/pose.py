@@ -8,7 +8,7 @@ from typing import ClassVar, cast
 from wirebayes.answers.robot import of_pose
 from wirebayes.json_files.pose import PoseJson, known_at_the_end, stays
 from wirebayes.json_files.pose_history import PoseHistoryJson
-from wirebayes.robot.mechanics.wires_used import specimens_in_words
+from wirebayes.robot.mechanics.wires_used import specimens_in_words, undecided_in_words
 from wirebayes.sentences import coordinates, lasting
 from wirebayes.views.result import NOTHING, Given, Result, figure, html_table
 
@@ -27,8 +27,9 @@ class Pose(Result[PoseJson | PoseHistoryJson]):
 
     @property
     def messages(self) -> tuple[str, ...]:
-        """The estimated spread of specimens, and the warnings."""
-        return (*specimens_in_words(self.summary()["wires"]), *super().messages)
+        """The models that are undecided, the estimated spread of specimens, and the warnings."""
+        wires = self.summary()["wires"]
+        return (*undecided_in_words(wires), *specimens_in_words(wires), *super().messages)
 
     def lines(self) -> list[str]:
         return of_pose(self.summary())

@@ -33,7 +33,7 @@ from wirebayes.report.pages import pose_history
 from wirebayes.report.pages.robot_view import robot_view
 from wirebayes.report.pages.wires_known import wires_known
 from wirebayes.report.pictures.robot import CONTROLLERS
-from wirebayes.robot.mechanics.wires_used import specimens_in_words
+from wirebayes.robot.mechanics.wires_used import specimens_in_words, undecided_in_words
 from wirebayes.sentences import lasting, quantity, short, specimens_are
 
 _FIRST = 2  # pictures that prove the answer: how far it moves, and how far it turns
@@ -133,6 +133,7 @@ def _requested(pose: PoseJson) -> Points:
     wires = pose.get("wires")
     if wires:
         points.append(wires_known(wires))
+        points += undecided_in_words(wires)
         points += specimens_in_words(wires)
         points += _commanded(pose)
     return Points("What was computed", points)

@@ -28,7 +28,7 @@ from wirebayes.report.blocks import (
 from wirebayes.report.cells import NONE, at_row
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages.wires_known import wires_known
-from wirebayes.robot.mechanics.wires_used import specimens_in_words
+from wirebayes.robot.mechanics.wires_used import specimens_in_words, undecided_in_words
 from wirebayes.sentences import counted, from_to, lasting
 
 _CAPTIONS = {
@@ -116,6 +116,7 @@ def _requested(pose: PoseHistoryJson) -> list[str]:
     began = _began(history)
     out = [f"{rows} of {kind} over {duration} s; {platform}."]
     out.append(f"{known} {spread} {began}")
+    out += undecided_in_words(wires)
     out += specimens_in_words(wires)
     out.append(_restarted(history))
     readings = pose.get("readings")

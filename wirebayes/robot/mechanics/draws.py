@@ -26,6 +26,22 @@ LENGTH_EXPONENT = "length_exponent"  # creep elongation grows as length to this 
 
 
 @dataclass(frozen=True)
+class UndecidedModels:
+    """Models between which the readings of a line leave it undecided.
+
+    Attributes
+    ----------
+    models : tuple of tuple of str
+        The effects of each that a robot's wires show too, by their keys; the most probable model first.
+    of_draw : (n,) int array
+        Which of them each draw is of.
+    """
+
+    models: tuple[tuple[str, ...], ...]
+    of_draw: Indices
+
+
+@dataclass(frozen=True)
 class WireDraws:
     """Joint posterior draws of one line.
 
@@ -55,6 +71,8 @@ class WireDraws:
         after a typical hold. Empty: a stated spread is used.
     specimens : int
         How many were tested.
+    undecided : UndecidedModels or None
+        Where draws are of several models; `effects` are those of all, neutral in the draws of models without them.
     doubts : tuple of Notice
         What the fits say against using them.
     """
@@ -72,6 +90,7 @@ class WireDraws:
     others: Mapping[str, "WireDraws"] = field(default_factory=dict)
     spread: Mapping[str, Floats] = field(default_factory=dict)
     specimens: int = 1
+    undecided: UndecidedModels | None = None
     doubts: tuple[Notice, ...] = ()
 
     @property
@@ -88,14 +107,16 @@ class WireDraws:
         others = {name: line.part(index) for name, line in self.others.items()}
         parameters = {name: values[index] for name, values in self.parameters.items()}
         spread = {name: values[index] for name, values in self.spread.items()}
-        return replace(self, parameters=parameters, spread=spread, others=others)
+        undecided = self.undecided and replace(self.undecided, of_draw=self.undecided.of_draw[index])
+        return replace(self, parameters=parameters, spread=spread, others=others, undecided=undecided)
 
     def centre(self) -> "WireDraws":
-        """One wire with the posterior mean of every parameter: what a controller would use."""
+        """One wire with the mean of every parameter, under the most probable model."""
         others = {name: line.centre() for name, line in self.others.items()}
-        parameters = {name: np.array([values.mean()]) for name, values in self.parameters.items()}
-        spread = {name: np.array([values.mean()]) for name, values in self.spread.items()}
-        return replace(self, parameters=parameters, spread=spread, others=others)
+        best = self.undecided.of_draw == 0 if self.undecided else np.ones(self.count, bool)
+        parameters = {name: np.array([values[best].mean()]) for name, values in self.parameters.items()}
+        spread = {name: np.array([values[best].mean()]) for name, values in self.spread.items()}
+        return replace(self, parameters=parameters, spread=spread, others=others, undecided=None)
 
     @property
     def each(self) -> dict[str, "WireDraws"]:

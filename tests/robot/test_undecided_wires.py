@@ -1,0 +1,164 @@
+"""Wires whose test leaves undecided which effects they have: draws of all models, each moving the robot as its own."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.light import POLICY
+from tests.robot.lines import CORE, line_about
+from wirebayes.cli import main
+from wirebayes.commands.wires import draws_of, posterior_of
+from wirebayes.effects import catalogue, effect_named
+from wirebayes.effects.creep import SteadyCreep, SteadyCreepCarried
+from wirebayes.inference.fit import fit_problem
+from wirebayes.io import paper
+from wirebayes.io.run_folder import read_json
+from wirebayes.model.build import build
+from wirebayes.results import store
+from wirebayes.results.mixture import write_mixture
+from wirebayes.robot.mechanics import draws, schema
+from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.undecided_models import draws_of_each, models_together, that_go_together
+from wirebayes.robot.mechanics.wires_used import undecided_in_words, wires_summary
+from wirebayes.robot.motion import drift
+
+
+def model_with(effects, count, seed, **values):
+    """A model about known parameters, with effects at values (n,) that scatter as well."""
+    line = line_about(CORE, 0.05, count, seed)
+    scatter = np.random.default_rng(seed).uniform(0.9, 1.1, count)
+    own = {name.replace("__", "."): value * scatter for name, value in values.items()}
+    return replace(line, parameters={**line.parameters, **own}, effects=tuple(effects))
+
+
+def models() -> list[WireDraws]:
+    """Of one test: a second relaxation, a stiffening with a sensor's curve, and what only the bench did."""
+    return [
+        model_with([effect_named("second_relaxation")], 5, 1, second_relaxation__A=0.05, second_relaxation__T2=20.0),
+        model_with(
+            [effect_named("strain_stiffening"), effect_named("sensor_nonlinearity")], 3, 2, strain_stiffening__c=40.0
+        ),
+        model_with([effect_named("sensor_drift")], 2, 3),
+    ]
+
+
+def drifted(line):
+    robot = schema.read_robot_file("cogiro-desk")
+    wires = draws.for_robot(robot, line)
+    course = drift.from_command(robot, wires, robot.home_m, np.eye(3), np.array([0.0, 60.0, 600.0]))
+    assert course.found.all()
+    return course.position_m
+
+
+def test_each_draw_moves_the_robot_as_under_its_own_model() -> None:
+    each = models()
+    whole = models_together(each)
+    assert [effect.name for effect in whole.material()] == ["second_relaxation", "strain_stiffening"]
+    for number, model in enumerate(each):
+        # by itself, for draws that creep together share their steps
+        own = whole.part(np.flatnonzero(whole.undecided.of_draw == number))
+        np.testing.assert_allclose(drifted(own), drifted(model), rtol=0, atol=1e-12)
+
+
+def test_few_draws_evenly_taken_are_of_all_models() -> None:
+    whole = models_together(models())
+    assert np.bincount(whole.undecided.of_draw).tolist() == [5, 3, 2]
+    few = whole.part(slice(0, 5))
+    assert sorted(few.undecided.of_draw.tolist()) in ([0, 0, 0, 1, 2], [0, 0, 1, 1, 2])
+    assert few.undecided.of_draw.tolist() == whole.undecided.of_draw[:5].tolist()
+
+
+def test_the_centre_is_that_of_the_most_probable_model() -> None:
+    first, *_ = each = models()
+    centre = models_together(each).centre()
+    assert centre.undecided is None
+    assert centre.parameters["strain_stiffening.c"] == 0.0
+    for name, values in first.parameters.items():
+        assert centre.parameters[name] == pytest.approx(values.mean(), rel=1e-12)
+
+
+def test_a_shape_without_its_amplitude_is_that_of_the_others() -> None:
+    first, *_ = each = models()
+    whole = models_together(each)
+    rows = whole.undecided.of_draw != 0
+    assert (whole.parameters["second_relaxation.A"][rows] == 0.0).all()
+    expected = first.parameters["second_relaxation.T2"].mean()
+    assert whole.parameters["second_relaxation.T2"][rows] == pytest.approx(np.full(5, expected), rel=1e-12)
+
+
+def test_two_variants_of_an_effect_do_not_go_together() -> None:
+    beside, carried = (
+        model_with([effect], 4, 0, steady_creep__a=1e-5) for effect in (SteadyCreep(), SteadyCreepCarried())
+    )
+    plain = model_with([], 4, 0)
+    assert that_go_together([carried, plain, beside, carried]) == [0, 1, 3]
+
+
+@pytest.mark.parametrize(
+    ("probabilities", "counts", "most", "shares"),
+    [
+        ([0.6, 0.4], [1000, 1000], 100, [60, 40]),
+        ([0.3, 0.2], [1000, 1000], 100, [60, 40]),  # of those that go together
+        ([0.6, 0.4], [30, 1000], 100, [30, 20]),
+        ([0.999, 0.001], [1000, 1000], 100, [100, 0]),
+    ],
+)
+def test_draws_are_taken_in_proportion_to_probability(probabilities, counts, most, shares) -> None:
+    assert draws_of_each(np.array(probabilities), counts, most) == shares
+
+
+def test_models_that_differ_on_the_bench_alone_are_one_in_a_robot() -> None:
+    robot = schema.read_robot_file("cogiro-desk")
+    sensor, delay = (model_with([effect_named(name)], 4, 0) for name in ("sensor_drift", "reading_delay"))
+    wires = wires_summary(robot, models_together([sensor, delay]))
+    assert wires["undecided"] == {"default": [{"effects": [], "share": 1.0}]}
+    assert undecided_in_words(wires) == []
+    assert "undecided" not in wires_summary(robot, models_together([sensor]))
+    said = undecided_in_words(wires_summary(robot, models_together(models())))
+    assert said == [
+        "The test leaves undecided which effects the wire has: draws are of second relaxation (50 %), strain "
+        "stiffening (30 %) and none of them (20 %)."
+    ]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A final posterior of nylon with a stiffening, beside which the plain model is undecided."""
+    final = tmp_path_factory.mktemp("final")
+    nylon = paper.experiments()[2]
+    for place, names in ((final, ["strain_stiffening"]), (final / "undecided" / "1", [])):
+        place.mkdir(parents=True, exist_ok=True)
+        effects = [catalogue()[name]() for name in names]
+        store.save_posterior(fit_problem(build([nylon], effects), 1, policy=POLICY), place, {})
+    write_mixture(final, [(".", 0.7, ["strain_stiffening"]), ("undecided/1", 0.3, [])])
+    return final
+
+
+def test_a_folder_gives_draws_of_all_its_models(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = draws_of(folder, 50)
+    bent = line.parameters["strain_stiffening.c"] != 0
+    assert line.count == 50 and bent.sum() == 35
+    alone = draws_of(folder / "undecided" / "1", 15)
+    np.testing.assert_array_equal(line.parameters["k1"][~bent], alone.parameters["k1"])
+    out = tmp_path / "out"
+    asked = ["pose", "linear-6", "--wires", str(folder), "--times", "0,60", "--draws", "50", "--output", str(out)]
+    assert main([*asked, "--tolerance", "1e-6"]) == 0
+    said = "draws are of strain stiffening (70 %) and none of them (30 %)"
+    assert said in capsys.readouterr().err
+    assert said in (out / "report.html").read_text(encoding="utf-8")
+    assert read_json(out / "pose.json")["wires"]["undecided"] == {
+        "default": [{"effects": ["strain_stiffening"], "share": 0.7}, {"effects": [], "share": 0.3}]
+    }
+
+
+def test_another_probability_is_another_configuration(folder: Path) -> None:
+    before = posterior_of(folder, None)
+    assert before == posterior_of(folder, None)
+    write_mixture(folder, [(".", 0.6, ["strain_stiffening"]), ("undecided/1", 0.4, [])])
+    assert posterior_of(folder, None) != before
+    write_mixture(folder, [(".", 0.7, ["strain_stiffening"]), ("undecided/1", 0.3, [])])
+    assert posterior_of(folder / "undecided" / "1", None) == folder / "undecided" / "1" / "posterior.nc"
