@@ -6,12 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.robot.test_usable import _read, _session
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.draws import stated_line
 from wirebayes.robot.self_calibration.answer import holds_of
 from wirebayes.robot.self_calibration.descent import descend
-from wirebayes.robot.self_calibration.equations import FRICTIONLESS, Noise
+from wirebayes.robot.self_calibration.equations import FRICTIONLESS, Noise, State
+from wirebayes.robot.self_calibration.estimate import estimate
 from wirebayes.robot.self_calibration.holds_creep import ROUGHLY, creep_of
+from wirebayes.robot.self_calibration.residuals import trust
 from wirebayes.robot.self_calibration.seeds import seed
 from wirebayes.robot.self_calibration.session import LengthPrior
 from wirebayes.robot.self_calibration.session_file import read_session
@@ -34,3 +37,21 @@ def test_a_descent_comes_down_where_balance_bends_the_way(joint_m):
     start = descend(unknowns, holds, replace(noise, balance=0.3), state, creep, state, 6).state
     few, many = (descend(unknowns, holds, noise, start, creep, state, steps).cost for steps in (12, 96))
     assert few < 1.01 * many
+
+
+@pytest.mark.parametrize("reference", [1e-3, 1e-4])
+def test_a_search_from_elsewhere_ends_where_what_readings_hardly_tell_is_as_the_prior_has_it(reference):
+    """Two wires: what they hardly tell of references is tested against its prior, and no search may leave it behind."""
+    robot, prior, session, rng = _session(2, kinds=("planar-2",))
+    prior = replace(prior, reference_sd_m=reference * robot.span_m)
+    readings = _read(robot, prior, session, rng)
+    holds = holds_of(robot, session.without_poses(), readings)
+    unknowns = Unknowns(robot, prior, StatedErrors(joint_m=0.0))
+    start = State(np.zeros(unknowns.count), session.position_m, session.rotation, holds.tension_N)
+    found = estimate(unknowns, holds, start)
+    white = found.state.white.copy()
+    white[unknowns.references] += 1.0
+    again = estimate(unknowns, holds, replace(found.state, white=white))
+    assert found.converged
+    assert again.converged
+    assert trust(again) == pytest.approx(trust(found), rel=0.01)

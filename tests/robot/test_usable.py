@@ -28,10 +28,10 @@ from wirebayes.strict.table import csv_table
 SPREAD = 1e-3  # from wire to wire: small, so that a session of eight stops is solved in a moment
 
 
-def _session(seed, sd=0.02):
+def _session(seed, sd=0.02, kinds=("point-4", "point-5", "body-7", "body-8")):
     """A session of a drawn robot and its prior; tensions are read to a share of their largest."""
     rng = np.random.default_rng(seed)
-    one = drawn.draw(str(rng.choice(["point-4", "point-5", "body-7", "body-8"])), rng, count=40, sd=0.01)
+    one = drawn.draw(str(rng.choice(kinds)), rng, count=40, sd=0.01)
     robot = one.robot
     x = rng.uniform(robot.lower_m, robot.upper_m, (60, 3))
     R = np.broadcast_to(np.eye(3), (60, 3, 3))

@@ -20,6 +20,9 @@ from wirebayes.robot.self_calibration.unknowns import Unknowns
 _FAR, _TURN = 0.02, 0.3  # of the span, rad: a larger step leaves what slopes describe, for another equilibrium
 _CORRECTIONS, _AS_FORESEEN = 3, 0.5  # of poses and tensions, where a step gains less than half of what slopes foresee
 _GAIN = 1e-3  # of the sum of squares: less changes no estimate by a hundredth of its standard deviation
+# Of the squares of all slopes, in a descent's first step, without effect on exact loops, after a step that failed, and
+# where steps lead nowhere. Estimates that only loops and readings together tell are held fast by any but the least.
+_AT_FIRST, _LEAST, _ONCE_MORE, _MOST = 1e-6, 1e-12, 1e-9, 1e6
 _STEPS = 12  # of a descent: noise and creep change before more are worth it
 
 
@@ -103,19 +106,23 @@ def descend(
     """
     target = _Target(unknowns, holds, noise, creep, since)
     here = target.at(state).followed()
-    damping = 1e-6
+    damping = _AT_FIRST
+    undamped = False
     for _ in range(steps):
         there = target.ahead(here, damping)
-        if there.cost < here.cost:
-            gain = here.cost - there.cost
+        undamped |= damping == _LEAST
+        gain = here.cost - there.cost
+        level = abs(gain) < _GAIN
+        if gain > 0:
             here = there.followed()
-            damping = max(damping / 10, 1e-12)
-            if gain < _GAIN:
-                return here.ended(True)
+        if level and undamped:  # a damped step gains little wherever it is
+            return here.ended(True)
+        if level:
+            damping = _LEAST
         else:
-            damping = max(damping * 10, 1e-9)
-            if damping > 1e6:
-                return here.ended(True)
+            damping = max(damping / 10, _LEAST) if gain > 0 else max(damping * 10, _ONCE_MORE)
+        if damping > _MOST:
+            return here.ended(True)
     return here.ended(False)
 
 
