@@ -10,7 +10,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.arrays import protocol_of_columns
 from wirebayes.io.readings import protocol_table
 from wirebayes.io.run_folder import check_file, write_csv
-from wirebayes.prediction.given_back import not_given_back
+from wirebayes.prediction.given_back import let_back
 from wirebayes.prediction.request import ProtocolRequest, request_of
 from wirebayes.prediction.table import (
     Prediction,
@@ -107,7 +107,7 @@ def predict(
         write_csv(file, header(control), rows)
     doubts = [doubt for _, stored in members for doubt in stored.doubts]
     doubts += beyond_tested(rows, first)
-    doubts += not_given_back(rows, first, fresh=fresh)
+    doubts += let_back(rows, first, fresh=fresh)
     doubts += unlikely_readings(requests, seed)
     attributes = {"prediction": _sentence(requests), "seed": seed, **_warnings(doubts)}
     return dataset(rows, attributes, control)
