@@ -5,7 +5,7 @@ import pytest
 import wirebayes as wb
 from tests.io.bench_files import convert
 from wirebayes.io.bench.about import About
-from wirebayes.io.bench.undecided import Choices
+from wirebayes.io.bench.undecided import Choices, Undecided
 
 ABOUT = About("wire", "line", 1000.0)
 ROWS = [(70.0 * hold + t, hold + 1.0, 10 * hold + 9 - t / 100) for hold in range(4) for t in (0.25, 10.5, 20.125, 40)]
@@ -111,3 +111,29 @@ def test_labview_without_a_column_of_times_counts_from_its_preamble(tmp_path, de
 def test_a_page_that_is_called_a_workbook_is_named(tmp_path):
     with pytest.raises(wb.InputError, match="line 1: found HTML or XML, expected .* save it as xlsx"):
         read(tmp_path, "<html><body><table>", ["<tr><td>1</td><td>2</td></tr>"])
+
+
+def test_columns_that_count_the_same_or_nothing_are_one(tmp_path):
+    """As a program of a fatigue machine writes them."""
+    header = "Total Time (s),Total Cycles,Elapsed Cycles,Step,Position (mm),Load (N)"
+    made = read(tmp_path, header, [f"{t},{x - 1:.0f},0,{x:.0f},{x},{f:.4f}" for t, x, f in ROWS])
+    assert_is_the_test(made)
+    assert "hold from 'Total Cycles'" in made.notes[0]
+    lines = [f"{t},{x - 1:.0f},{int(t > 100)},{x:.0f},{x},{f:.4f}" for t, x, f in ROWS]
+    with pytest.raises(Undecided, match="found Total Cycles and Elapsed Cycles, each of which may be the hold"):
+        read(tmp_path, header, lines)
+
+
+def test_steps_of_a_motor_may_be_the_displacement_that_is_missing(tmp_path):
+    lines = [f"{t},{200 * x:.0f},{f:.4f}" for t, x, f in ROWS]
+    with pytest.raises(Undecided, match=r'say which with --map "pos_steps=displacement \[0.5 mm\]" \(with the length'):
+        read(tmp_path, "time_s,pos_steps,force_N", lines)
+    assert_is_the_test(
+        read(tmp_path, "time_s,pos_steps,force_N", lines, mapping=("pos_steps=displacement [0.005 mm]",))
+    )
+
+
+def test_a_unit_that_is_not_known_is_refused_with_what_can_be_copied(tmp_path):
+    lines = [f"{t},{x},{f:.4f}" for t, x, f in ROWS]
+    with pytest.raises(wb.InputError, match=r'; or --map "Load \(% MBL\)=tension \[N\]" if that is what it means'):
+        read(tmp_path, "time_s,x_mm,Load (% MBL)", lines)

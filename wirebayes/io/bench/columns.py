@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from wirebayes.errors import InputError, shown
 from wirebayes.io.bench.clock import UNDERSTOOD, are_moments, has_moments, looks_like_a_moment
@@ -26,9 +27,9 @@ from wirebayes.io.bench.sheet import SheetRow, is_number
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.two_clocks import best_clock, clock_of, parting
 from wirebayes.io.bench.two_units import finest_of_same
-from wirebayes.io.bench.undecided import Undecided
+from wirebayes.io.bench.undecided import Undecided, quoted
 from wirebayes.io.bench.unit_names import units_alone
-from wirebayes.io.bench.words import ERRORS, last_named, speaks_of, words_in
+from wirebayes.io.bench.words import COUNTED, ERRORS, last_named, speaks_of, words_in
 from wirebayes.sentences import listed
 
 _NEEDED: tuple[Role, ...] = ("displacement", "time", "tension")
@@ -130,7 +131,7 @@ def _complete(table: RawTable, roles: Columns, free: Sequence[int]) -> Columns:
     missing = [role for role in _NEEDED if role not in roles]
     if not missing:
         return roles
-    used = {column.index for column in roles.values()}
+    used = {column.index for column in roles.values() if not _may_count(column, missing)}
     if missing == list(_NEEDED):
         by_units = units_alone(table, _NEEDED, used.union(free))
         if by_units:
@@ -142,10 +143,17 @@ def _complete(table: RawTable, roles: Columns, free: Sequence[int]) -> Columns:
     raise missing_columns(table, unread, missing)
 
 
+def _may_count(column: Column, missing: Sequence[Role]) -> bool:
+    """Whether a column taken for numbers of holds may be the missing displacement, counted in steps of a motor."""
+    return "displacement" in missing and column.role == "hold" and not words_in(column.header).isdisjoint(COUNTED)
+
+
 def _one(table: RawTable, likely: Sequence[int], role: Role) -> Column:
     """The column of a quantity among those that may be it."""
     of_wire = [i for i in likely if not is_of_sample(table, i, role)]  # a force before a stress
     different = _without_copies(table, of_wire or likely)
+    if role == "hold" and len(different) > 1:
+        different = _that_divide(table, different)
     if role == "tension" and len(different) > 1:
         different = _only_varying(table, different)
     if len(different) > 1:
@@ -167,6 +175,17 @@ def _only_varying(table: RawTable, likely: list[int]) -> list[int]:
     return varying if len(varying) == 1 else likely
 
 
+def _that_divide(table: RawTable, likely: list[int]) -> list[int]:
+    """The columns that divide the readings, without those that divide them as one before; all where none does.
+
+    Machines count several things beside each other, such as steps and cycles, most of them the same throughout.
+    """
+    columns = [table.column(i) for i in likely]
+    changes = [tuple(a != b for a, b in pairwise(cells)) for cells in columns]
+    dividing = {change: i for change, i in reversed([*zip(changes, likely, strict=True)]) if any(change)}
+    return sorted(dividing.values()) or likely
+
+
 def _without_copies(table: RawTable, likely: Sequence[int]) -> list[int]:
     """The columns without those that repeat the numbers of one before them, in one unit."""
     out: list[int] = []
@@ -185,11 +204,14 @@ def _without_errors(table: RawTable, likely: Sequence[int], role: Role) -> list[
 
 def _one_clock(table: RawTable, likely: Sequence[int]) -> Column:
     """The best of several columns of time that agree; a question where they do not."""
-    columns = [column_as(table, index, "time") for index in likely]
+    of_time = [i for i in likely if not _counts_elapsed(table, i)] or likely
+    columns = [column_as(table, index, "time") for index in of_time]
     found = [clock_of(table, column.index, column.unit) for column in columns]
     clocks = [clock for clock in found if clock is not None]
     if len(clocks) < len(columns):
         raise _several(table, likely, "time")
+    if len(clocks) == 1:
+        return columns[0]
     for clock in clocks[1:]:
         row = parting(clocks[0], clock)
         if row is not None:
@@ -200,6 +222,13 @@ def _one_clock(table: RawTable, likely: Sequence[int]) -> Column:
                 f", which tell different times from line {table.line_text(table.rows[row].line)} on",
             )
     return columns[best_clock(clocks)]
+
+
+def _counts_elapsed(table: RawTable, index: int) -> bool:
+    """Whether a column without a unit names something else than a time last: ``Elapsed Cycles``."""
+    header = table.header[index]
+    has_unit = name_and_unit(header, "time").unit is not None or bool(table.units[index])
+    return not has_unit and not has_moments(table, index) and last_named(header) != "time"
 
 
 def column_as(table: RawTable, index: int, role: Role, stated: str | None = None) -> Column:
@@ -279,7 +308,7 @@ def _no_unit(table: RawTable, index: int, role: Role) -> InputError:
     foreign = bracket[2] if bracket else ""
     if foreign not in NO_UNIT and not foreign.isdigit():
         found = f"the unit {foreign!r}"
-        as_usual = f'"{map_to} [{usual}]" if that is what it means'
+        as_usual = f"{quoted(f'{map_to} [{usual}]')} if that is what it means"
         expected = f"one of {role}{_units(role)}; or {as_usual}, or [0.5 {usual}] if one {foreign} is 0.5 {usual}"
         return table.complain(table.header_line, index, found, expected)
     first = table.rows[0]
