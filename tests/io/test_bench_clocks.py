@@ -303,3 +303,28 @@ def test_an_offset_from_utc_leaves_no_doubt_of_an_hour(tmp_path):
     moments = [f"2024-03-31T{clock}+01:00" for clock in ("01:58:00", "01:58:30", "01:59:30", "03:00:00", "03:00:30")]
     (hold,) = on_the_wall(tmp_path, moments).experiment.holds
     assert hold.duration_s == 3750.0
+
+
+@pytest.mark.parametrize("form", ["{h:02d}.{m:02d}.{s:02d}", "{h:02d}:{m:02d}:{s:02d}:250"])
+def test_clocks_with_points_and_with_thousandths_behind_a_colon(tmp_path, form):
+    times = (0, 40, 80)
+    lines = []
+    for hold in (1, 2, 3):
+        for time in times:
+            of_day = 35400 + 300 * hold + time  # from 9.55.00
+            lines.append(
+                f"{form.format(h=of_day // 3600, m=of_day // 60 % 60, s=of_day % 60)};{hold};{5 * hold - time / 100}"
+            )
+    path = tmp_path / "raw.csv"
+    path.write_text("\n".join(["Zeit;Weg [mm];Kraft [N]", *lines]))
+    made = convert(path, About("wire", "line", 1000.0), Choices())
+    assert [hold.start_s for hold in made.experiment.holds] == [0.0, 300.0, 600.0]
+    assert [row[2] for row in made.rows if row[3] is not None] == [*times] * 3
+
+
+def test_a_date_stands_beside_a_clock_with_points(tmp_path):
+    lines = [f"1{d}.06.2026;{h}.30.00;{x};{f}" for d, h, x, f in [(4, 22, 1, 5.0), (4, 23, 1, 4.9), (5, 1, 2, 9.0)]]
+    path = tmp_path / "raw.csv"
+    path.write_text("\n".join(["Datum;Uhrzeit;Weg [mm];Kraft [N]", *lines, "15.06.2026;2.30.00;2;8.9"]))
+    made = convert(path, About("wire", "line", 1000.0), Choices())
+    assert [hold.start_s for hold in made.experiment.holds] == [0.0, 10800.0]

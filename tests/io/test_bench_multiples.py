@@ -117,3 +117,26 @@ def test_the_refusal_of_turns_says_how_to_write_the_length_of_one(tmp_path):
     wanted = r'--map "screw \(turns\)=displacement \[0.5 mm\]" \(with the length of one in place of 0.5 mm\)'
     with pytest.raises(InputError, match=wanted):
         convert(path, About("wire", "line", 1000.0), Choices())
+
+
+@pytest.mark.parametrize(
+    ("unit", "weight"), [("short_ton", 8896.443231), ("long_ton", 9964.016418), ("tonne", 9806.65)]
+)
+def test_tons_are_asked_about(tmp_path, unit, weight):
+    path = tmp_path / "raw.csv"
+    lines = [f"{t},{x},{x * (1 - t / 1000)}" for x in (1, 2) for t in (0, 30, 60)]
+    path.write_text("\n".join(["Time (s),Displacement (mm),Load (tons)", *lines]))
+    with pytest.raises(
+        Undecided, match=r"found tons, which may be of 2000 lb, .* --map \"Load \(tons\)=tension"
+    ) as refused:
+        convert(path, ABOUT, Choices())
+    option = next(option for option in refused.value.answers if unit in option)
+    made = convert(path, ABOUT, Choices().with_option(option))
+    assert made.rows[0][3] == pytest.approx(weight)
+
+
+def test_kilonewtons_in_capitals(tmp_path):
+    path = tmp_path / "raw.csv"
+    lines = [f"{t},{x},{x * (1 - t / 1000)}" for x in (1, 2) for t in (0, 30, 60)]
+    path.write_text("\n".join(["TIME (S),DISPLACEMENT (MM),LOAD (KN)", *lines]))
+    assert convert(path, ABOUT, Choices()).rows[0][3] == pytest.approx(1000.0)

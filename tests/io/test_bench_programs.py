@@ -137,3 +137,14 @@ def test_a_unit_that_is_not_known_is_refused_with_what_can_be_copied(tmp_path):
     lines = [f"{t},{x},{f:.4f}" for t, x, f in ROWS]
     with pytest.raises(wb.InputError, match=r'; or --map "Load \(% MBL\)=tension \[N\]" if that is what it means'):
         read(tmp_path, "time_s,x_mm,Load (% MBL)", lines)
+
+
+@pytest.mark.parametrize("sign", [" ", "\t", ","])
+def test_numbers_of_rows_without_a_name_stand_before_the_columns(tmp_path, sign):
+    """As R writes a table."""
+    header = sign.join(['"time_s"', '"x (mm)"', '"F [N]"'])
+    lines = [sign.join([f'"{i}"', str(t), str(x), f"{f:.4f}"]) for i, (t, x, f) in enumerate(ROWS, start=1)]
+    assert_is_the_test(read(tmp_path, header, lines))
+    lines[3] = lines[3].replace('"4"', '"9"')  # no numbers of rows: who knows what
+    with pytest.raises(wb.InputError, match="found 4 cells, expected 3 as in the header"):
+        read(tmp_path, header, lines)

@@ -102,3 +102,16 @@ def test_an_option_with_a_name_of_several_words_is_quoted(tmp_path):
     book.save(tmp_path / "a.xlsx")
     with pytest.raises(Undecided, match='expected --sheet Werte or --sheet "Werte 2" to say'):
         convert_all(tmp_path / "a.xlsx", ABOUT, Choices())
+
+
+def test_a_time_goes_on_beyond_24_hours(tmp_path):
+    book = openpyxl.Workbook()
+    book.active.append(["Elapsed", "Displacement (mm)", "Force (N)"])
+    for hold in (1, 2, 3):
+        for hours in (0, 4):
+            book.active.append([(10 * hold + hours) / 24, hold, 5 * hold - hours / 10])
+            book.active.cell(book.active.max_row, 1).number_format = "hh:mm:ss"
+    book.save(tmp_path / "a.xlsx")
+    made = convert(tmp_path / "a.xlsx", ABOUT, Choices())
+    assert [hold.start_s for hold in made.experiment.holds] == [0.0, 36000.0, 72000.0]
+    assert [row[2] for row in made.rows if row[3] is not None] == [0.0, 14400.0] * 3

@@ -22,7 +22,7 @@ from wirebayes.io.bench.mapping import IGNORE, mapped_columns
 from wirebayes.io.bench.missing import check_settings_of_runs, missing_columns
 from wirebayes.io.bench.multiples import multiple_of_unit, unit_in_header
 from wirebayes.io.bench.numerals import is_count
-from wirebayes.io.bench.quantities import COMMON, OF_SAMPLE, ROLES, UNITS, Role, Unit, quantity_unit
+from wirebayes.io.bench.quantities import COMMON, OF_SAMPLE, ROLES, TONS, UNITS, Role, Unit, is_ton, quantity_unit
 from wirebayes.io.bench.sheet import SheetRow, is_number
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.two_clocks import best_clock, clock_of, parting
@@ -306,6 +306,10 @@ def _no_unit(table: RawTable, index: int, role: Role) -> InputError:
     map_to = f"--map {header}={role}"
     bracket = UNIT_IN_BRACKETS.match(header)
     foreign = bracket[2] if bracket else ""
+    where = table.where(table.header_line, index)
+    if role == "tension" and (is_ton(foreign) or is_ton(table.units[index])):
+        tons = {f"{map_to} [{name}]": meaning for name, meaning in TONS.items()}
+        return Undecided(f"{where}: found tons, which may be of 2000 lb, of 2240 lb or of 1000 kg", "which", tons)
     if foreign not in NO_UNIT and not foreign.isdigit():
         found = f"the unit {foreign!r}"
         as_usual = f"{quoted(f'{map_to} [{usual}]')} if that is what it means"
@@ -315,7 +319,6 @@ def _no_unit(table: RawTable, index: int, role: Role) -> InputError:
     cell = first.cell(index)
     if role == "time" and looks_like_a_moment(cell):
         return table.complain(first.line, index, shown(cell), UNDERSTOOD)
-    where = table.where(table.header_line, index)
     answers = {f"{map_to} [{name}]": name for name in _usual(table, index, role)}
     return Undecided(f"{where}: found no unit", f"the unit of {role}", answers)
 

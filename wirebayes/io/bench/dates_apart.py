@@ -1,6 +1,7 @@
 """Dates, or numbers of days, in a column of their own beside clocks: a day that passes is then no guess."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import date, timedelta
 from itertools import pairwise
@@ -18,6 +19,8 @@ _DAY = {"day", "days", "tag", "jour", "dia", "giorno", "dag", "day no", "tag nr"
 _FIRST_DAY = date(2001, 1, 1)  # whatever it was: days are counted
 _DIGITS = 3  # of the number of a day: no test lasts for years
 _YEAR_LAST = re.compile(r"(\d{1,2})[/-](\d{1,2})[/-](\d{2,4})")
+_WITH_POINTS = re.compile(r"(\d{1,2})\.(\d\d)\.(\d\d)(?:[.,]\d+)?")
+_HOURS, _MINUTES, _MONTHS = 24, 60, 12
 _HALF_A_DAY = 12  # hours: a clock of the day that begins anew has gone beyond
 _MIDNIGHT = "00:00:00"  # what spreadsheets add to a date
 
@@ -31,6 +34,7 @@ def with_dates(table: RawTable, time_since: TimeSince | None) -> RawTable:
     time_since : {"hold", "test"} or None
         What the user says that times count from.
     """
+    table = _with_colons(table)
     clocks = [i for i, name in enumerate(table.header) if name and _are_clocks(table, i)]
     dates = [i for i, name in enumerate(table.header) if name and _are_dates(table, i)]
     of_time = [i for i in range(len(table.header)) if _tells_time(table, i)]
@@ -40,6 +44,28 @@ def with_dates(table: RawTable, time_since: TimeSince | None) -> RawTable:
     if time_since == "hold" or any(_count_from_zero(table, i) for i in clocks):
         return table
     return dated(table)
+
+
+def _with_colons(table: RawTable) -> RawTable:
+    """The table with colons in clocks whose parts stand between points, as 11.50.00: no dates have them all."""
+    columns = {i for i, name in enumerate(table.header) if name and _have_points(table.column(i))}
+    if not columns:
+        return table
+    rows = []
+    for row in table.rows:
+        cells = [cell.replace(".", ":", 2) if i in columns else cell for i, cell in enumerate(row.cells)]
+        rows.append(replace(row, cells=tuple(cells)))
+    return replace(table, rows=tuple(rows))
+
+
+def _have_points(cells: Sequence[str]) -> bool:
+    """Whether cells are clocks with points: one at least has a second number that no month has."""
+    found = [_WITH_POINTS.fullmatch(cell) for cell in cells if cell]
+    parts = [[int(part) for part in match.groups()] for match in found if match is not None]
+    if not parts or len(parts) < len(found):
+        return False
+    are_clocks = all(hour < _HOURS and max(minute, second) < _MINUTES for hour, minute, second in parts)
+    return are_clocks and max(minute for _, minute, _ in parts) > _MONTHS
 
 
 def _tells_time(table: RawTable, column: int) -> bool:

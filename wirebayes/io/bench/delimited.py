@@ -20,6 +20,8 @@ _BETWEEN_WORDS = re.compile(r"\s+(?![(\[][^()\[\]]*[)\]])")  # but not before a 
 _UNDER_A_HEADER = re.compile(r":?-{2,}:?")  # of a table in Markdown
 _WITH_UNIT = re.compile(r"[-+]?\d+([.,]\d+)? ?[^\W\d]{1,5}\d?")  # 4 mm, 11.02 N
 _QUOTED_LINE = re.compile(r'"([^"]|"")*"')
+_QUOTED_FIRST = re.compile(r'"[^"]*"(\s+("[^"]*"|[^"\s]+))*')  # cells between spaces, the first of them quoted
+_QUOTED_OR_BARE = re.compile(r'"([^"]*)"|([^"\s]+)')
 _SIGN = re.compile(r"[,;\t|]")
 _OPEN_CELL = re.compile(
     r'^(?:[^"]|"[^"]*")*(?:^|[,;\t|])\s*"[^"]*$'
@@ -149,6 +151,8 @@ def _score(lines: list[str], sign: str) -> tuple[float, int, int]:
 
 def _cells(line: str, sign: str) -> list[str]:
     if sign == " ":
+        if _QUOTED_FIRST.fullmatch(line.strip()):
+            return [quoted or bare_word for quoted, bare_word in _QUOTED_OR_BARE.findall(line)]
         return _BETWEEN_WORDS.split(joined_measures(line.strip())) if line.strip() else []
     return [_bare_cell(cell.strip()) for cell in next(csv.reader([line], delimiter=sign, skipinitialspace=True), [])]
 

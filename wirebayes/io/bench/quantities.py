@@ -52,6 +52,9 @@ _STRAINS = {
     "%": 0.01, "percent": 0.01, "prozent": 0.01, "‰": 0.001, "mm/mm": 1.0, "m/m": 1.0, "in/in": 1.0, "mm/m": 0.001,
     "µm/m": 1e-6, "um/m": 1e-6, "µε": 1e-6, "ustrain": 1e-6, "microstrain": 1e-6, "strain": 1.0, "ε": 1.0,
 }  # fmt: skip
+# Tons are of 2000 lb, of 2240 lb or of 1000 kg: what is called so is asked about.
+TONS = {"short_ton": "2000 lb", "long_ton": "2240 lb", "tonne": "1000 kg"}
+_TON = {"ton", "tons"}
 _LETTER = r"[^\W\d_]"
 _UNIT = re.compile(rf"[-−]?({_LETTER}|[°º℃℉\"])({_LETTER}|[°º._ -]){{0,15}}")
 _SQUARE = re.compile(r"(\^|\*\*)?2$|²$")
@@ -115,7 +118,7 @@ def quantity_unit(text: str, role: Role) -> Unit | None:
     share = _of_sample(bare, role)
     if share is not None:
         return Unit(text, sign * share, of_sample=True)
-    if not _UNIT.fullmatch(text):
+    if not _UNIT.fullmatch(text) or is_ton(bare):
         return None
     if role == "temperature":
         name = _TEMPERATURES.get(bare.lower())
@@ -125,6 +128,11 @@ def quantity_unit(text: str, role: Role) -> Unit | None:
     if found is None:
         return None
     return Unit(text, sign * found[0], found[1], is_mass=found[2])
+
+
+def is_ton(text: str) -> bool:
+    """Whether a text is a ton, of which there are several."""
+    return text.lower() in _TON
 
 
 def _of_sample(text: str, role: Role) -> float | None:
@@ -156,7 +164,7 @@ def is_foreign(text: str) -> bool:
 
 def _spelling(text: str) -> str:
     if text.endswith("N") or text == "Nm":  # mN and MN, a torque and a nanometre differ in more than spelling
-        return text.replace("Nm", "N*m")
+        return text.replace("Nm", "N*m").replace("KN", "kN")
     return _SPELLINGS.get(text.lower(), text)
 
 

@@ -24,7 +24,8 @@ _DATE = (
     rf"|(?P<named>\d{{1,2}}[-. /]{{1,2}}({'|'.join(MONTHS)})[^\W\d_]{{0,6}}[-. /]{{1,2}}(\d{{4}}|\d{{2}}))"
 )
 _CLOCK = (
-    r"(?P<first>\d{1,12}):(?P<second>\d{1,2})(:(?P<third>\d{1,2}))?([.,](?P<fraction>\d+))?"
+    r"(?P<first>\d{1,12}):(?P<second>\d{1,2})(:(?P<third>\d{1,2}))?"
+    r"(([.,]|(?<=\d:\d\d:\d\d):(?=\d{3}(?!\d)))(?P<fraction>\d+))?"
     r"( ?(?P<half>[ap])\.?m\.?)?(?(date) ?(?P<zone>Z|UTC|[+\-\u2212]\d{2}(:?\d{2})?)?)"
 )
 # 2026年6月14日 9時58分0秒 in Japanese, and in Chinese

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from wirebayes.errors import InputError
@@ -143,6 +143,7 @@ def find_table(sheet: Sheet) -> RawTable:
     if not _is_header(head) or _is_title(head, shown):
         return _without_header(sheet, first)
     _check_names_are_short(sheet, head)
+    head = _beside_row_names(head, rows[first:])
     width = max(len(row.cells) for row in (head, *shown))
     header = _padded(head.cells, width)
     names = _padded(others[-1].cells, width) if others else ()
@@ -169,6 +170,16 @@ def _with_names_from_above(
         if has_values and not header[i] and any(map(speaks_of_a_quantity, _WORD.findall(name))):
             names[i], left[i] = name, ""
     return tuple(names), tuple(left)
+
+
+def _beside_row_names(head: SheetRow, below: Sequence[SheetRow]) -> SheetRow:
+    """The header with an empty cell for the numbers 1, 2, 3 … that stand before each row and have no name in it."""
+    readings = [row for row in below if not row.comment]
+    one_more = all(len(row.cells) == len(head.cells) + 1 for row in readings)
+    numbers = [str(i) for i in range(1, len(readings) + 1)]
+    if not one_more or [row.cells[0] for row in readings] != numbers:
+        return head
+    return replace(head, cells=("", *head.cells))
 
 
 def _padded(cells: Sequence[str], width: int) -> tuple[str, ...]:

@@ -14,6 +14,8 @@ from wirebayes.io.bench.sheet import Sheet, SheetRow, is_number, is_value
 from wirebayes.io.bench.undecided import Decimal, Undecided
 from wirebayes.strict.hint import hint
 
+_FIRST_DAY = datetime(1899, 12, 31)  # number 0 of a spreadsheet that shows times alone
+_FIRST_MONTH = datetime(1900, 2, 1)  # no test is as old
 SIGNATURE = b"PK\x03\x04"
 OLD_EXCEL = b"\xd0\xcf\x11\xe0"
 
@@ -126,6 +128,9 @@ def _text(cell: Any, with_comma: Mapping[str, str]) -> str:
         hours, rest = divmod(round(value.total_seconds(), 6), 3600.0)
         minutes, seconds = divmod(rest, 60.0)
         return f"{hours:.0f}:{minutes:02.0f}:{seconds:09.6f}"
+    if isinstance(value, datetime) and value < _FIRST_MONTH:  # a time that went on beyond 24 hours
+        hours = 24 * (value - _FIRST_DAY).days + value.hour
+        return f"{hours}:{value.minute:02d}:{value.second:02d}.{value.microsecond:06d}"
     if isinstance(value, datetime):
         return value.isoformat(sep=" ")
     if isinstance(value, date | time):
