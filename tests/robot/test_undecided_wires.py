@@ -1,14 +1,19 @@
 """Wires whose test leaves undecided which effects they have: draws of all models, each moving the robot as its own."""
 
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import wirebayes as wb
 from tests.light import POLICY
 from tests.robot.lines import CORE, line_about
 from wirebayes.cli import main
+from wirebayes.commands import pose_history
+from wirebayes.commands.asked_pose import AskedPose
 from wirebayes.commands.wires import draws_of, posterior_of
 from wirebayes.effects import catalogue, effect_named
 from wirebayes.effects.creep import SteadyCreep, SteadyCreepCarried
@@ -18,11 +23,19 @@ from wirebayes.io.run_folder import read_json
 from wirebayes.model.build import build
 from wirebayes.results import store
 from wirebayes.results.mixture import write_mixture
+from wirebayes.robot.history.unknowns import Uncertain
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.mechanics.draws import WireDraws
-from wirebayes.robot.mechanics.undecided_models import draws_of_each, models_together, that_go_together
+from wirebayes.robot.mechanics.undecided_models import (
+    draws_of_each,
+    models_together,
+    most_probable,
+    that_go_together,
+)
 from wirebayes.robot.mechanics.wires_used import undecided_in_words, wires_summary
 from wirebayes.robot.motion import drift
+
+pose = import_module("wirebayes.commands.pose")
 
 
 def model_with(effects, count, seed, **values):
@@ -77,6 +90,23 @@ def test_the_centre_is_that_of_the_most_probable_model() -> None:
     assert centre.parameters["strain_stiffening.c"] == 0.0
     for name, values in first.parameters.items():
         assert centre.parameters[name] == pytest.approx(values.mean(), rel=1e-12)
+
+
+def test_the_most_probable_model_alone_has_as_many_draws() -> None:
+    first, *_ = each = models()
+    other = replace(first, name="thick")
+    line = replace(models_together(each), others={"thick": other})
+    alone = most_probable(line)
+    assert alone.count == line.count == 10 and alone.undecided is None
+    assert set(alone.parameters) == set(first.parameters)
+    assert [effect.name for effect in alone.material()] == ["second_relaxation"]
+    for name, values in first.parameters.items():
+        np.testing.assert_array_equal(np.sort(alone.parameters[name]), np.sort(np.tile(values, 2)))
+    (said,) = alone.doubts
+    assert said.kind == "left-out" and said.text.endswith(
+        "only the most probable is used here: second relaxation, 50 %"
+    )
+    assert alone.others["thick"].parameters == first.parameters and alone.others["thick"].doubts == ()
 
 
 def test_a_shape_without_its_amplitude_is_that_of_the_others() -> None:
@@ -153,6 +183,31 @@ def test_a_folder_gives_draws_of_all_its_models(
     assert read_json(out / "pose.json")["wires"]["undecided"] == {
         "default": [{"effects": ["strain_stiffening"], "share": 0.7}, {"effects": [], "share": 0.3}]
     }
+
+
+def test_a_calibration_goes_by_the_most_probable_model(folder: Path, tmp_path: Path) -> None:
+    session = Path(__file__).parents[2] / "docs" / "example" / "linear-7-session.csv"
+    found = wb.calibrate("linear-7", session, wires=folder, draws=50, output=tmp_path / "out")
+    said = [notice.text for notice in found.warnings if notice.kind == "left-out"]
+    assert any("only the most probable is used here: strain stiffening, 70 %" in text for text in said)
+
+
+def test_a_history_goes_on_with_the_wires_that_were_calibrated(monkeypatch: pytest.MonkeyPatch) -> None:
+    line = models_together(models())
+    kept: list[WireDraws] = []
+
+    def calibrated_of(calibration: object, robot: object, own: WireDraws, *_: object) -> object:
+        return SimpleNamespace(prior=SimpleNamespace(line=own, spread=0.05))
+
+    monkeypatch.setattr(pose_history, "calibrated_of", calibrated_of)
+    errors = pose_history.calibrated_errors(Uncertain(), "folder", None, line, None, None)  # type: ignore[arg-type]
+    monkeypatch.setattr(pose, "pose_over_time", lambda asked, *_: kept.append(asked.line))
+    asked = AskedPose(None, line, None, None, 0, None, 0.0)  # type: ignore[arg-type]
+    pose._along(asked, None, "path", errors, None)  # type: ignore[arg-type]
+    pose._along(asked, "log", None, Uncertain(), None)  # type: ignore[arg-type]
+    of_calibration, without = kept
+    assert of_calibration.undecided is None and of_calibration.count == line.count
+    assert without is line
 
 
 def test_another_probability_is_another_configuration(folder: Path) -> None:

@@ -29,6 +29,7 @@ from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, typical_spread
 from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.mechanics.undecided_models import most_probable
 from wirebayes.robot.self_calibration import answer, session_file
 from wirebayes.robot.self_calibration.calibrated import Calibrated, from_dict, to_dict
 from wirebayes.robot.self_calibration.search import StatedPoses
@@ -142,7 +143,7 @@ def calibrate(
     machine = _known_robot(robot)
     bias = _tension_bias(machine, tension_bias)
     session, values, read = _session(readings, machine, given, bias)
-    line = draws_for(machine, wires, draws, experiment, own)
+    line = most_probable(draws_for(machine, wires, draws, experiment, own))
     options = {
         "--experiment": experiment,
         **given.of_readings(),

@@ -76,4 +76,6 @@ def live(
     draws = check_whole("draws", draws, 1)
     line = draws_for(machine, wires, draws, experiment, path_of(own_effects))
     errors = calibrated_errors(errors, calibration, machine, line, wires, experiment)
+    if errors.calibrated is not None:
+        line = errors.calibrated.prior.line
     return LiveEstimator(machine, line, errors, (where, matrix(turn)), reads, check_seed(seed))

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +24,8 @@ from wirebayes.commands.wires import (
     RobotLike,
     Wires,
     configuration,
-    content_hash,
+    content_of,
     draws_for,
-    folder_of,
     posterior_of,
     robot_of,
 )
@@ -47,7 +46,6 @@ from wirebayes.robot.pose.request import PoseRequest
 from wirebayes.strict.files import PathLike
 from wirebayes.views.calibration import Calibration
 from wirebayes.views.pose import Pose
-from wirebayes.views.posterior import POSTERIOR
 from wirebayes.views.result import ResultFolder
 
 # an option; closest in the minute that the paper speaks of, and on to an hour
@@ -203,6 +201,8 @@ def pose(
 
 def _along(asked: AskedPose, joints: Any, trajectory: Any, errors: Uncertain, begun: Begun) -> Pose:
     """Poses over time, of measured joint values or of commands."""
+    if errors.calibrated is not None:
+        asked = replace(asked, line=errors.calibrated.prior.line)
     if joints is None:
         return pose_over_time(asked, "--trajectory", trajectory, errors, begun)
     if trajectory is not None:
@@ -244,7 +244,7 @@ class _Given:
         """Draws of another fit of the line, and what its content is known by; none where there is none."""
         if fit is None:
             return None, None
-        return self.draws_of(fit, machine), content_hash(folder_of(fit, self.experiment) / POSTERIOR)
+        return self.draws_of(fit, machine), content_of(fit, self.experiment)
 
     def begun(self, options: Mapping[str, Any]) -> Begun:
         """Where results go, and what decides them."""

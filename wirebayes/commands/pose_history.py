@@ -23,6 +23,7 @@ from wirebayes.robot.history.unknowns import Uncertain
 from wirebayes.robot.mechanics import plane
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.undecided_models import most_probable
 from wirebayes.robot.motion.boundless_creep import refuse_boundless_creep
 from wirebayes.robot.self_calibration.calibrated import to_dict
 from wirebayes.sentences import short
@@ -81,6 +82,7 @@ def calibrated_errors(
     robot : Robot
         Without payload.
     line : WireDraws
+        Of undecided models the most probable counts.
     wires : Posterior, path or mapping
         What `line` was read from.
     experiment : str or None
@@ -98,7 +100,7 @@ def calibrated_errors(
         return errors
     if errors.reference_m:
         raise InputError("--reference-sd: found beside --calibration, which knows the lengths, expected one of them")
-    known = calibrated_of(calibration, robot, line, wires, experiment)
+    known = calibrated_of(calibration, robot, most_probable(line), wires, experiment)
     return replace(errors, spread=known.prior.spread, calibrated=known)
 
 

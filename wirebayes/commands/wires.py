@@ -67,20 +67,26 @@ def posterior_of(wires: Wires | None, experiment: str | None) -> Path | str:
     """The posterior that decides a result; of several lines, what tells them all; empty where there is none."""
     if wires is None:
         return ""
-    if _several(wires):
-        return hash_of({name: str(_content_of(line, experiment)) for name, line in wires.items()})
-    if _is_sample(wires):
-        return _content_of(wires, experiment)
+    if _several(wires) or _is_sample(wires):
+        return content_of(wires, experiment)
     folder = folder_of(wires, experiment)
     return _content_of_models(folder) if len(members_of(folder)) > 1 else folder / POSTERIOR
 
 
-def _content_of(line: Specimens, experiment: str | None) -> str:
-    """What tells the posteriors of a line from others."""
-    if not _is_sample(line):
-        return _content_of_models(folder_of(line, experiment))
+def content_of(wires: Wires, experiment: str | None) -> str:
+    """What tells the posteriors of wires from others.
+
+    Parameters
+    ----------
+    wires : line, several specimens of it, or mapping of wire name to one of them
+    experiment : str or None
+    """
+    if _several(wires):
+        return hash_of({name: content_of(line, experiment) for name, line in wires.items()})
+    if not _is_sample(wires):
+        return _content_of_models(folder_of(wires, experiment))
     each = {}
-    for i, one in enumerate(line):
+    for i, one in enumerate(wires):
         each[str(i)] = content_hash(folder_of(one, experiment) / POSTERIOR)
     return hash_of(each)
 

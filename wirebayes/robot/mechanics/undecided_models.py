@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from wirebayes.numeric.typing import Floats
+from wirebayes.result_warnings import Notice
 from wirebayes.robot.mechanics.draws import CORE, LENGTH_EXPONENT, UndecidedModels, WireDraws
+from wirebayes.sentences import spoken
 from wirebayes.wire.effect import Effect
 
 
@@ -72,6 +74,33 @@ def models_together(models: Sequence[WireDraws]) -> WireDraws:
     doubts = dict.fromkeys(doubt for model in models for doubt in model.doubts)
     undecided = UndecidedModels(keys, of_model[order])
     return replace(united, parameters=parameters, undecided=undecided, doubts=tuple(doubts))
+
+
+def most_probable(line: WireDraws) -> WireDraws:
+    """The draws of the most probable model alone, some of them repeated so that there are as many.
+
+    For a calibration, whose unknowns are normal: a normal distribution cannot be of several models.
+
+    Parameters
+    ----------
+    line : WireDraws
+        One without undecided models is returned as it is.
+    """
+    others = {name: most_probable(other) for name, other in line.others.items()}
+    if line.undecided is None:
+        return replace(line, others=others)
+    own = line.undecided.models[0]
+    of_best = np.flatnonzero(line.undecided.of_draw == 0)
+    share = len(of_best) / line.count
+    rows = of_best[np.arange(line.count) * len(of_best) // line.count]
+    left_out = [effect for effect in line.material() if effect.key not in own]
+    columns = {column for effect in left_out for column in effect.columns()}
+    parameters = {name: values[rows] for name, values in line.parameters.items() if name not in columns}
+    effects = tuple(effect for effect in line.effects if effect not in left_out)
+    named = " with ".join(spoken(key) for key in own) or "the plain one"
+    text = f"of the models that the test leaves undecided only the most probable is used here: {named}"
+    doubts = (*line.doubts, Notice("left-out", f"{text}, {100 * share:.0f} %"))
+    return replace(line, parameters=parameters, effects=effects, undecided=None, doubts=doubts, others=others)
 
 
 def _of_all(name: str, models: Sequence[WireDraws], effects: Sequence[Effect]) -> Floats:

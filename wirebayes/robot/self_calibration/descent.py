@@ -119,8 +119,10 @@ def descend(
             return here.ended(True)
         if level:
             damping = _LEAST
+        elif gain > 0:
+            damping = max(damping / 10, _LEAST)
         else:
-            damping = max(damping / 10, _LEAST) if gain > 0 else max(damping * 10, _ONCE_MORE)
+            damping = max(damping * 10, _ONCE_MORE)
         if damping > _MOST:
             return here.ended(True)
     return here.ended(False)
