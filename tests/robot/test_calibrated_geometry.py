@@ -111,27 +111,32 @@ def far():
 def test_each_draw_of_a_history_has_its_own_points(far):
     """Away from the session, points that are off no longer make up for the references."""
     robot, line, history, errors, near = far
-    found = estimate_poses(robot, line, history, near, errors, np.random.default_rng(0)).track.position_m[:, 0]
+    found = estimate_poses(robot, line, history, near, errors, np.random.default_rng(0)).track
     known = unknowns(robot, line, errors, np.random.default_rng(0))
     white = known.draws
     values = known.mean + white @ known.root.T
     wires, reference = known.columns(white)
     strain = known.carried(white).strain(wires).T
     bare, offset = inverse.lengths(robot, history.joint_m[:1])
-    real = []
+    real, pull = [], []
     for n, row in enumerate(values):
         own = replace(robot, exit_m=robot.exit_m + row[-3 * robot.legs :].reshape(-1, 3))
         zero = (bare + reference[n]) * (1 + strain[n])
-        real.append(forward.solve_equilibrium(own, wires.part([n]), zero, offset, *near).position_m[0])
-    real = np.array(real)
+        here = forward.solve_equilibrium(own, wires.part([n]), zero, offset, *near)
+        real.append(here.position_m[0])
+        pull.append(here.tension_N[0])
+    real, pull = np.array(real), np.array(pull)
     assert real.std(0).max() > 5e-4
-    assert np.abs(found - real).max() < 0.1 * real.std(0).max()
+    assert np.abs(found.position_m[:, 0] - real).max() < 0.1 * real.std(0).max()
+    assert (np.abs(found.tension_N[:, 0] - pull).max(0) < 0.1 * pull.std(0)).all()
 
 
 def test_a_running_estimate_has_them_too(far):
     robot, line, history, errors, near = far
-    batch = estimate_poses(robot, line, history, near, errors, np.random.default_rng(0)).track.position_m[:, 0]
+    track = estimate_poses(robot, line, history, near, errors, np.random.default_rng(0)).track
+    batch, pull = track.position_m[:, 0], track.tension_N[:, 0]
     for reads in (False, True):
         now = LiveEstimator(robot, line, errors, near, reads).step(0.0, history.joint_m[0])
         np.testing.assert_allclose(now.position_m, batch.mean(0), atol=0.05 * batch.std(0).max())
         np.testing.assert_allclose(now.position_sd_m, batch.std(0), rtol=0.05)
+        np.testing.assert_allclose(now.tension_N, pull.mean(0), atol=0.05 * pull.std(0).max())

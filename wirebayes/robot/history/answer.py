@@ -167,7 +167,8 @@ class _Asked:
             starts_s = stated_starts(stated)
         elif np.isinf(restart):
             starts_s = starts_s[:1]
-        wires, error_m = known.columns_along(known.draws, found.plain)
+        wires, _ = known.columns(known.draws)
+        error_m, _ = known.errors_along(known.draws, found.plain)
         carried = known.carried(known.draws)
         return follow_log(self.robot, wires, self.history, joint_m, self.near, starts_s, error_m, carried=carried)
 

@@ -64,10 +64,9 @@ def drift_along(
     known = unknowns(robot, line, exact, rng)
     wires, error = known.columns(known.draws)
     tau = _held_tensions(robot, fine)
-    if errors.calibrated is None:
-        error = np.zeros_like(error)  # of lengths that nobody measured nothing but creep is followed
-    else:
-        error = known.lengths_along(known.draws, _without_drift(fine, tau, np.zeros(len(tau), int)))
+    pull = error = np.zeros_like(error)  # of lengths that nobody measured nothing but creep is followed
+    if errors.calibrated is not None:
+        error, pull = known.errors_along(known.draws, _without_drift(fine, tau, np.zeros(len(tau), int)))
     carried = known.carried(known.draws)
     strain = carried.strain(wires)
     joint = _commanded_joints(robot, fine, wires, tau, strain, error)
@@ -77,7 +76,7 @@ def drift_along(
     def watched(row: int) -> None:
         progress("poses", row + 1, len(tau))
 
-    track = follow_log(robot, wires, fine, joint, start, starts, error, watched, carried)
+    track = follow_log(robot, wires, fine, joint, start, starts, error, watched, carried).pulled_more(pull)
     plain = _without_drift(fine, tau, track.hold)
     found = Estimate(track.at_rows(kept), plain.at_rows(kept), wires, errors_at(error, kept), starts)
     commanded = np.swapaxes(joint[kept], 0, 1)

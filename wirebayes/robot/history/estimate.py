@@ -232,19 +232,24 @@ class _Way:
         without : (w,) bool array
             Wires that bear nothing.
         """
-        wires, error = self.known.columns_along(white, self.plain)
+        wires, _ = self.known.columns(white)
+        error, pull = self.known.errors_along(white, self.plain)
         if without.any():
             stiffness = np.where(without[:, None], _NONE * wires.theta["k1"], wires.theta["k1"])
             wires = replace(wires, theta=dict(wires.theta) | {"k1": stiffness})
-        return self.track(wires, error, self.known.carried(white), name)
+        track = self.track(wires, error, self.known.carried(white), name)
+        return track.pulled_more(np.where(without, 0.0, pull))
 
     def followed(self, white: Floats) -> Estimate:
         """White draws followed."""
-        wires, error = self.known.columns_along(white, self.plain)
-        track = self.track(wires, error, self.known.carried(white), "poses")
-        return Estimate(track, self.plain, wires, error, self.starts_s)
+        track = self.white(white, "poses", np.zeros(self.known.robot.legs, bool))
+        return self._estimate(white, track)
 
     def estimate(self, out: Draws) -> Estimate:
         """Draws of the posterior that were followed."""
-        white = out.white[:, : self.known.count]
-        return Estimate(out.track, self.plain, *self.known.columns_along(white, self.plain), self.starts_s)
+        return self._estimate(out.white[:, : self.known.count], out.track)
+
+    def _estimate(self, white: Floats, track: Track) -> Estimate:
+        wires, _ = self.known.columns(white)
+        error, _ = self.known.errors_along(white, self.plain)
+        return Estimate(track, self.plain, wires, error, self.starts_s)

@@ -54,6 +54,11 @@ class Track:
             strain=self.strain[index],
         )
 
+    def pulled_more(self, more_N: Floats) -> "Track":
+        """The same where wires that bear pull by more, ``(t, n, w)`` or ``(n, w)`` N, and none by less than nothing."""
+        more = np.swapaxes(more_N, 0, 1) if more_N.ndim == 3 else more_N[:, None]
+        return replace(self, tension_N=pulling_more(self.tension_N, more))
+
     def at_rows(self, rows: Indices) -> "Track":
         """Some of the rows."""
         position, rotation = self.position_m[:, rows], self.rotation[:, rows]
@@ -67,6 +72,11 @@ class Track:
         out.tension_N[at] = other.tension_N
         out.strain[at] = other.strain
         return out
+
+
+def pulling_more(tension_N: Floats, more_N: Floats) -> Floats:
+    """Tensions of wires of which those that bear pull by more, and none by less than nothing."""
+    return np.where(tension_N > 0, np.maximum(tension_N + more_N, 0.0), tension_N)
 
 
 def follow_log(

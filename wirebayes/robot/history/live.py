@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike
 from wirebayes.errors import InputError
 from wirebayes.numeric.rows import chosen_rows, pair_at
 from wirebayes.numeric.typing import Bools, Floats, Indices
+from wirebayes.robot.history import live_input
 from wirebayes.robot.history.beside import beside, beside_fresh
-from wirebayes.robot.history.follow import RESTART
+from wirebayes.robot.history.follow import RESTART, pulling_more
 from wirebayes.robot.history.history import roll_and_pitch, with_payload
-from wirebayes.robot.history.live_input import checked_number, checked_reading, checked_vector, refuse_bad
 from wirebayes.robot.history.live_pose import LivePose
 from wirebayes.robot.history.readings import Information, Sensors, reading_weight, sensors
 from wirebayes.robot.history.unknowns import LogUnknowns, Uncertain, slopes, unknowns
@@ -99,6 +99,7 @@ class LiveEstimator:
         self._known, self._white = known, white
         self._wires = beside(wires, known.plain)
         self._error = np.concatenate([error, np.zeros((1, legs))])
+        self._more = np.zeros_like(self._error)
         self._state = beside_fresh(carried, legs)
         self._columns = len(self._error)
         self._live = np.ones(self._columns, bool)
@@ -129,7 +130,7 @@ class LiveEstimator:
         """
         if self.robot.is_linear.any():
             raise InputError(f"straight_m: found lengths, expected displacements of the actuators of {self.robot.name}")
-        return firmware.wire_of(self.robot, checked_vector("straight_m", straight_m, self.robot.joints))
+        return firmware.wire_of(self.robot, live_input.checked_vector("straight_m", straight_m, self.robot.joints))
 
     def load(self, mass_kg: float, centre_m: ArrayLike | None = None) -> None:
         """Set what the platform carries from now on beside its own mass.
@@ -145,12 +146,12 @@ class LiveEstimator:
         InputError
             A negative mass, or what is not finite; the load stays as it was.
         """
-        mass, centre = checked_number("mass_kg", mass_kg), self._bare.centre_of_mass_m
+        mass, centre = live_input.checked_number("mass_kg", mass_kg), self._bare.centre_of_mass_m
         if not 0 <= mass < np.inf:
             raise InputError(f"mass_kg: found {mass:g}, expected kilograms, 0 or more")
         if centre_m is not None:
-            centre = checked_vector("centre_m", centre_m, 3)
-            refuse_bad("centre_m", centre, np.isfinite(centre), "a finite number")
+            centre = live_input.checked_vector("centre_m", centre_m, 3)
+            live_input.refuse_bad("centre_m", centre, np.isfinite(centre), "a finite number")
         self.robot = with_payload(self._bare, mass, centre)
 
     def step(
@@ -192,14 +193,14 @@ class LiveEstimator:
             raise InputError("readings: found some, expected none; make the estimator with reads=True")
         joint = self._joints("joint_m", joint_m)
         nominal = joint if nominal_m is None else self._joints("nominal_m", nominal_m)
-        tension = checked_reading("tension_N", tension_N, self.robot.legs)
-        tilt = checked_reading("tilt_rad", tilt_rad, 2)
+        tension = live_input.checked_reading("tension_N", tension_N, self.robot.legs)
+        tilt = live_input.checked_reading("tilt_rad", tilt_rad, 2)
         with np.errstate(all="ignore"):  # a draw whose platform falls has no numbers
             return self._step(time, joint, nominal, np.concatenate([tension, tilt]))
 
     def _later(self, time_s: float) -> float:
         """A time that is later than at the step before."""
-        time = checked_number("time_s", time_s)
+        time = live_input.checked_number("time_s", time_s)
         if not time > self._last:
             raise InputError(f"time_s: found {time:g} after {self._last:g}, expected a later time")
         if time == np.inf:
@@ -208,24 +209,15 @@ class LiveEstimator:
 
     def _joints(self, name: str, values: ArrayLike) -> Floats:
         """Joint values as they can be: a drum has paid out some length, a linear actuator may stand on either side."""
-        given = checked_vector(name, values, self.robot.joints)
+        given = live_input.checked_vector(name, values, self.robot.joints)
         linear = of_each_winch(self.robot, self.robot.is_linear)
         finite = np.isfinite(given)
-        refuse_bad(name, given, finite | ~linear, "a finite number")
-        refuse_bad(name, given, (finite & (given > 0)) | linear, "a finite length above 0")
+        live_input.refuse_bad(name, given, finite | ~linear, "a finite number")
+        live_input.refuse_bad(name, given, (finite & (given > 0)) | linear, "a finite length above 0")
         each = of_each_leg(self.robot, given)
         if self._leaps(each):
-            self._refuse_unlikely(name, each)
+            live_input.refuse_unlikely(self.robot, name, each)
         return each
-
-    def _refuse_unlikely(self, name: str, each: Floats) -> None:
-        """Refuse joint values, leg by leg, that cannot be meant."""
-        unlikely = plausible.wrong(self.robot, each[None])
-        if unlikely is None:
-            return
-        (_, leg), expected = unlikely
-        joint = leg if self.robot.winch is None else self.robot.winch[leg]
-        raise InputError(f"{name}[{joint}]: found {each[leg]:g}, expected {expected}; wire_m() turns straight ones")
 
     def _leaps(self, given: Floats) -> bool:
         """Whether joint values are the first, or far from the last: only those may be of another kind."""
@@ -294,7 +286,14 @@ class LiveEstimator:
 
     def _place_errors(self, poses: Poses, tension_N: Floats) -> None:
         """Errors of the lengths are those at a pose; the wires that never creep have none."""
-        self._error[:-1] = self._known.lengths_at(self._white, poses, tension_N)[0]
+        error, more = self._known.errors_at(self._white, poses, tension_N)
+        self._error[:-1] = error[0]
+        self._more[:-1] = more[0]
+
+    @property
+    def _pull(self) -> Floats:
+        """Tensions of every column, of wires that run to where its own points are."""
+        return pulling_more(self._tension, self._more)
 
     def _settle_at(self, joint_m: Floats) -> None:
         bare, offset = inverse.lengths(self.robot, joint_m)
@@ -350,7 +349,7 @@ class LiveEstimator:
         """What the sensors say, added to what they said before."""
         n = self._n
         of = self._of
-        predicted = np.concatenate([self._tension, roll_and_pitch(self._R)], 1)[:-1]
+        predicted = np.concatenate([self._pull, roll_and_pitch(self._R)], 1)[:-1]
         since = None if self._last == -np.inf else time_s - self._last
         counts = reading_weight(since)
         normal = self._rng.standard_normal((n, len(y)))
@@ -390,7 +389,7 @@ class LiveEstimator:
         target = self._x[-1:], self._R[-1:], self._tension[-1:]
         strain = self._state.strain(self._wires)
         commands = inverse.commands(self.robot, self._wires, *target, strain, self._error.T)
-        return np.concatenate([self._x, turned, commands.joint_m, self._tension], 1)
+        return np.concatenate([self._x, turned, commands.joint_m, self._pull], 1)
 
     def _shown(self) -> Bools:
         """(n,) Draws that count: those that hang and are moved sanely, or all that hang where none is."""

@@ -5,6 +5,8 @@ from numpy.typing import ArrayLike
 
 from wirebayes.errors import InputError
 from wirebayes.numeric.typing import Bools, Floats
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.motion import plausible
 
 
 def checked_number(name: str, value: float) -> float:
@@ -63,3 +65,22 @@ def refuse_bad(name: str, given: Floats, good: Bools, expected: str) -> None:
     if not good.all():
         i = int(np.argmin(good))
         raise InputError(f"{name}[{i}]: found {given[i]:g}, expected {expected}")
+
+
+def refuse_unlikely(robot: Robot, name: str, joint_m: Floats) -> None:
+    """Refuse joint values that cannot be meant.
+
+    Parameters
+    ----------
+    robot : Robot
+    name : str
+        Of what is given, for the message.
+    joint_m : (w,) array
+        Of each leg.
+    """
+    unlikely = plausible.wrong(robot, joint_m[None])
+    if unlikely is None:
+        return
+    (_, leg), expected = unlikely
+    joint = leg if robot.winch is None else robot.winch[leg]
+    raise InputError(f"{name}[{joint}]: found {joint_m[leg]:g}, expected {expected}; wire_m() turns straight ones")

@@ -51,15 +51,9 @@ class Sensors:
 
 
 def sensors(robot: Robot, errors: Uncertain) -> Sensors:
-    """Tension sensors of all wires and an inclinometer.
-
-    Of a robot whose points were calibrated, readings are worth less: what is left of the points' errors turns the wires
-    as well as changing their lengths, and only the lengths are followed.
-    """
+    """Tension sensors of all wires and an inclinometer."""
     legs = robot.legs
     error = np.array([errors.tension_N] * legs + [errors.tilt_rad] * 2)
-    if errors.calibrated is not None:
-        error[:legs] = np.hypot(error[:legs], errors.calibrated.swing_N)
     return Sensors(error, np.array([robot.tension_bias_N] * legs + [0.0] * 2))
 
 

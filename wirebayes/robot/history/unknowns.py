@@ -92,8 +92,8 @@ class LogUnknowns:
         """Whether the lengths' errors differ from pose to pose, because points may be off."""
         return self.calibrated is not None and bool(self.calibrated.points)
 
-    def lengths_at(self, white: Floats, poses: Poses, tension_N: Floats) -> Floats:
-        """Errors ``(t, n, w)`` of the lengths of white unknowns ``(n, d)`` at poses.
+    def errors_at(self, white: Floats, poses: Poses, tension_N: Floats) -> tuple[Floats, Floats]:
+        """Errors ``(t, n, w)`` of the lengths of white unknowns ``(n, d)`` at poses, and of the tensions beside these.
 
         Parameters
         ----------
@@ -104,11 +104,12 @@ class LogUnknowns:
         """
         errors = self.mean + white @ self.root.T
         if self.calibrated is None:
-            return np.broadcast_to(errors[:, : self.robot.legs], (len(tension_N), len(white), self.robot.legs))
-        return self.calibrated.error_m(errors, poses, tension_N)
+            shape = len(tension_N), len(white), self.robot.legs
+            return np.broadcast_to(errors[:, : self.robot.legs], shape), np.zeros(shape)
+        return self.calibrated.errors_at(errors, poses, tension_N)
 
-    def lengths_along(self, white: Floats, track: Track) -> Floats:
-        """Errors of the lengths of white unknowns ``(n, d)``: ``(t, n, w)`` where they move, else ``(n, w)``.
+    def errors_along(self, white: Floats, track: Track) -> tuple[Floats, Floats]:
+        """`errors_at` of white unknowns ``(n, d)``: ``(t, n, w)`` where they move, else ``(n, w)``.
 
         Parameters
         ----------
@@ -118,15 +119,11 @@ class LogUnknowns:
         """
         held = track.held[0]
         if not self.errors_move or not held[0]:
-            return (self.mean + white @ self.root.T)[:, : self.robot.legs]
+            length = (self.mean + white @ self.root.T)[:, : self.robot.legs]
+            return length, np.zeros_like(length)
         row = np.maximum.accumulate(np.where(held, np.arange(len(held)), 0))
         poses = track.position_m[0, row], track.rotation[0, row]
-        return self.lengths_at(white, poses, track.tension_N[0, row])
-
-    def columns_along(self, white: Floats, track: Track) -> tuple[Wires, Floats]:
-        """The wires of white unknowns, and the errors of their lengths as `lengths_along` has them."""
-        wires, _ = self.columns(white)
-        return wires, self.lengths_along(white, track)
+        return self.errors_at(white, poses, track.tension_N[0, row])
 
     @property
     def plain(self) -> Wires:

@@ -9,8 +9,8 @@ from wirebayes.json_files.calibrate import CalibratedUnknowns
 from wirebayes.numeric.batches import batch_first, batch_last
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import statics
-from wirebayes.robot.mechanics.description import GRAVITY, Poses, Robot
-from wirebayes.robot.mechanics.draws import WireDraws, lines_of, nominal_length
+from wirebayes.robot.mechanics.description import Poses, Robot
+from wirebayes.robot.mechanics.draws import WireDraws, lines_of
 from wirebayes.robot.mechanics.rotation import matrix, vector
 from wirebayes.robot.motion.creep import CreepState
 from wirebayes.robot.self_calibration import predicted
@@ -54,25 +54,13 @@ class Calibrated:
         """(w,) what is still not known of the reference lengths."""
         return np.sqrt(np.diag(self.covariance)[: self.robot.legs])
 
-    @property
-    def swing_N(self) -> Floats:
-        """(w,) by how much points that are off change tensions, as they turn wires that bear about the weight."""
-        robot = self.robot
-        d = len(self.mean) - 3 * robot.legs * len(self.points)
-        variance = np.diag(self.covariance)[d:].reshape(len(self.points), robot.legs, 3).mean(2).sum(0)
-        return robot.mass_kg * GRAVITY * np.sqrt(variance) / nominal_length(robot)
-
     def carried(self, unknowns: Floats) -> CreepState:
         """Creep that wires of unknowns ``(n, d)`` carry out of the session; it depends on them as the readings do."""
         error_m = self.error_m(unknowns, (self.session.position_m, self.session.rotation), self.pull_N)
         return predicted.carried(self.robot, self.prior, self.session, unknowns, error_m)
 
     def error_m(self, unknowns: Floats, poses: Poses, tension_N: Floats) -> Floats:
-        """What lengths before creep are beyond what joint values say, ``(p, n, w)``.
-
-        A point that is off makes its wire's way longer or shorter, as an error of the reference does, but at every
-        pose by another amount; and it turns the wire, which holds the platform there only with other tensions. Both
-        are taken to first order as the errors of lengths that lead to the same pose.
+        """What lengths before creep are beyond what joint values say, ``(p, n, w)``, as `errors_at` has them.
 
         Parameters
         ----------
@@ -81,27 +69,50 @@ class Calibrated:
         tension_N : (p, w) array
             There, about.
         """
+        return self.errors_at(unknowns, poses, tension_N)[0]
+
+    def errors_at(self, unknowns: Floats, poses: Poses, tension_N: Floats) -> tuple[Floats, Floats]:
+        """What lengths before creep are beyond what joint values say, m, and tensions beyond those there, N.
+
+        A point that is off makes its wire's way longer or shorter, as an error of the reference does, but at every
+        pose by another amount; and it turns the wire, which holds the platform there only with other tensions. Both
+        are taken to first order as the errors of lengths that lead to the same pose. Wires of such lengths that run
+        to the points as found pull otherwise than those that run to where the points are: by these tensions.
+
+        Parameters
+        ----------
+        unknowns : (n, d) array
+        poses : (p, 3), (p, 3, 3) arrays
+        tension_N : (p, w) array
+            There, about.
+
+        Returns
+        -------
+        length_m, tension_N : (p, n, w) arrays
+        """
         legs = self.robot.legs
-        slopes = self._length_by_points(poses, tension_N)
-        error = np.zeros((len(poses[0]), len(unknowns), legs))
+        by_points = self._by_points(poses, tension_N)
+        shape = len(poses[0]), len(unknowns), legs
+        length = np.broadcast_to(unknowns[:, :legs], shape)
+        pull = np.zeros(shape)
         first = unknowns.shape[1] - 3 * legs * len(self.points)
         for name in self.points:
             end = first + 3 * legs
-            error = error + np.einsum("pwm,nm->pnw", slopes[name], unknowns[:, first:end])
+            own = unknowns[:, first:end]
+            by_length, by_pull = by_points[name]
+            length = length + np.einsum("pwm,nm->pnw", by_length, own)
+            pull = pull + np.einsum("pwm,nm->pnw", by_pull, own)
             first = end
-        return np.asarray(unknowns[:, :legs] + error)
+        return length, pull
 
-    def _length_by_points(self, poses: Poses, tension_N: Floats) -> dict[str, Floats]:
-        """Errors of lengths by the coordinates of points that come to the same, ``(p, w, 3 w)``."""
+    def _by_points(self, poses: Poses, tension_N: Floats) -> dict[str, tuple[Floats, Floats]]:
+        """Errors of lengths and of tensions by the coordinates of points, ``(p, w, 3 w)`` each."""
         robot = self.robot
         position, rotation = poses
         shape = statics.geometry(robot, position.T, batch_last(rotation))
         along = batch_first(shape.direction).mT * robot.lines[:, None]
         tension = np.maximum(tension_N, 0.0)
-        k1 = np.array([line.parameters["k1"].mean() for line in lines_of(robot, self.prior.line)])
-        longer = 1.0 + tension / k1
-        whole = np.where(robot.is_linear, robot.wire_m, robot.lines * shape.distance_m.T + robot.beyond_m)
-        softness = np.where(tension > 0, whole / (k1 * longer), 0.0)  # of wires that bear: m/N
+        softness, longer = self._softness(shape, tension)
         tension_by_force = np.linalg.pinv(batch_first(statics.wire_jacobian(robot, shape)) * (tension > 0)[:, None])
         turns = dict(zip(("exit", "platform"), swing(robot, shape, rotation, tension), strict=True))
         ways = {"exit": -along, "platform": np.einsum("pwi,pij->pwj", along, rotation)}
@@ -109,8 +120,18 @@ class Calibrated:
         for name, way in ways.items():
             own = np.einsum("pwi,wv->pwvi", way / longer[..., None], np.eye(robot.legs))
             turned = np.einsum("pwd,pdvi->pwvi", tension_by_force, turns[name])
-            out[name] = -(own + softness[..., None, None] * turned).reshape(*own.shape[:2], -1)
+            length = -(own + softness[..., None, None] * turned)
+            flat = *own.shape[:2], -1
+            out[name] = length.reshape(flat), -turned.reshape(flat)
         return out
+
+    def _softness(self, shape: statics.Geometry, tension_N: Floats) -> tuple[Floats, Floats]:
+        """How lengths (p, w) of wires that bear follow tensions, m/N, and how often as long all are as without them."""
+        robot = self.robot
+        k1 = np.array([line.parameters["k1"].mean() for line in lines_of(robot, self.prior.line)])
+        longer = 1.0 + tension_N / k1
+        whole = np.where(robot.is_linear, robot.wire_m, robot.lines * shape.distance_m.T + robot.beyond_m)
+        return np.where(tension_N > 0, whole / (k1 * longer), 0.0), longer
 
 
 def calibrated(found: RobotPosterior, session: Session) -> Calibrated:
