@@ -195,7 +195,11 @@ def test_what_is_undecided_has_a_menu(tab, served, tmp_path):
     tab.run("document.querySelector('input[type=number]').focus()")
     tab.call("Input.insertText", text="1200")
     tab.click("Read the file")
-    tab.wait_for("document.body.innerText.includes('the unit of displacement')")
+    tab.wait_for("document.body.innerText.includes('The unit of displacement')")
+    tab.call("Emulation.setDeviceMetricsOverride", width=390, height=900, deviceScaleFactor=1, mobile=False)
+    asks = "[...document.querySelectorAll('.page *')].filter(e => e.innerText?.includes('found no unit'))"
+    assert tab.run(f"{asks}.length") > 0
+    assert not tab.run(f"{asks}.some(e => e.scrollWidth > e.clientWidth && getComputedStyle(e).overflow == 'hidden')")
     tab.run("document.querySelector('[data-question=\"0\"]').click()")
     tab.wait_for("document.querySelector('.q-menu .q-item')")
     tab.run("[...document.querySelectorAll('.q-menu .q-item')].find(e => e.innerText.trim() == 'mm').click()")

@@ -147,13 +147,8 @@ class _TestPage:
                     'hint="for stresses only"'
                 )
             if asked:
-                ui.label("The file can be read in more than one way. Please say:").classes("warning")
-            menus = [
-                ui.select(question["answers"], label=f"{question['question']} ({question['found']})")
-                .classes("w-full")
-                .props(f'data-question="{number}"')
-                for number, question in enumerate(asked)
-            ]
+                ui.label("The file leaves something open. Please choose:").classes("warning")
+            menus = [_menu(number, question) for number, question in enumerate(asked)]
             chosen = list(about.get("options", ()))
             with ui.expansion("Say what a column is, where it was understood wrongly"):
                 columns = ui.textarea("HEADER=COLUMN or HEADER=COLUMN [UNIT], one a line", value="\n".join(chosen))
@@ -291,6 +286,14 @@ def _page() -> Any:
 
 def _heading(text: str) -> None:
     ui.label(text).props("role=heading aria-level=2").classes("text-xl")
+
+
+def _menu(number: int, question: dict[str, Any]) -> ui.select:
+    """The answers to what a file leaves open, below what was found, which may take several lines."""
+    ui.label(question["found"]).classes("text-sm said")
+    asked = question["question"]
+    menu = ui.select(question["answers"], label=asked[0].upper() + asked[1:])
+    return menu.classes("w-full").props(f'data-question="{number}"')
 
 
 def _option(line: str) -> str:
