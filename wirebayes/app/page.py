@@ -231,7 +231,10 @@ class _TestPage:
         record = self.test.record(READ) or {"warnings": [], "lines": [], "pictures": []}
         for warning in record["warnings"]:
             ui.label(warning).classes("warning")
-        ui.label("\n".join(record["lines"])).classes("said")
+        with ui.column().classes("gap-1"):
+            for line in record["lines"]:
+                indent = "pl-4" if line.startswith(" ") else ""
+                ui.label(line.strip()).classes(f"said {indent}")
         for picture in record["pictures"]:
             said = f"{Path(picture).stem}: settings and readings over the time of the test"
             ui.element("img").props(f'src="{self._address(picture)}" alt="{said}"')
