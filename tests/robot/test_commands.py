@@ -91,7 +91,7 @@ def test_pose_answers_and_repeats_to_the_byte(fitted, tmp_path, capsys):
     page = (out[0] / "report.html").read_text()
     assert "Between calibrations" in page
     assert pose["pose_error"][0]["times_s"] == [0.0, 60.0]  # each table has times of its own
-    assert "is the last of the requested times that is (0 s, 1 min)" in page
+    assert "is the last of the requested times (0 s, 1 min) that is within tolerance" in page
     assert "is the last such time on a grid of eight per decade, from 1 s on" in page
     assert (out[0] / "robot.svg").stat().st_size > 1000
     scene = read_json(out[0] / "scene.json")

@@ -547,3 +547,15 @@ def test_times_on_a_page_are_in_the_unit_in_which_they_are_read() -> None:
     bands = {"q05": [0.0, 0.1], "q50": [0.0, 0.2], "q95": [0.0, 0.3]}
     drifted: Any = {"specimen_spread": 0.05, "times_s": [0.0, 3600.0], "distance_mm": bands}
     assert [row[:2] for row in pose_page._drifted(drifted, False)] == [["5 %", "1 h"]]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "text"),
+    [
+        (-1.18e-8, 1.18e-8, "−0.000001 to 0.000001"),  # across the plane of a plotter
+        (-21.8766, -19.6341, "−21.88 to −19.63"),
+        (0.12391, 0.21779, "0.1239 to 0.2178"),
+    ],
+)
+def test_what_is_proved_is_rounded_outward_and_no_finer_than_a_nanometre(low, high, text):
+    assert pose_page._outward(low, high) == text

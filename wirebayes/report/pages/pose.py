@@ -148,7 +148,8 @@ def _commanded(pose: PoseJson) -> list[str]:
     low = number(min(tensions))
     high = number(max(tensions))
     rule = pose["tension_distribution"]["choice"].replace("_", " ")
-    points = [f"Tensions by the rule “{rule}”: {low} to {high} N."]
+    bounds = low if low == high else f"{low} to {high}"
+    points = [f"Tensions by the rule “{rule}”: {bounds} N."]
     angles = inverse.get("motor_angle_rad")
     if angles:
         turned = ", ".join("no drum" if angle is None else f"{angle:.5g}" for angle in angles["mean"])
@@ -293,7 +294,7 @@ def _errors(pose: PoseJson) -> list[Block]:
     first = entries[0]
     evaluated = ", ".join(map(lasting, first["times_s"]))
     caption = (
-        f"{_limits(first)} The last column is the last of the requested times that is ({evaluated}); "
+        f"{_limits(first)} The last column is the last of the requested times ({evaluated}) that is within tolerance; "
         "the next section has finer ones."
     )
     return [Table(header, lines, caption)]
@@ -381,9 +382,9 @@ def _how_many(found: EquilibriaJson) -> str:
 
 
 def _outward(low: float, high: float) -> str:
-    """A proved interval, rounded outward to a hundredth of its width (and no finer than it can be read)."""
-    digits = max(0, 2 - math.floor(math.log10(max(high - low, 1e-9))))
+    """A proved interval in mm, rounded outward to a hundredth of its width, or to nanometres if that is finer."""
+    digits = max(0, 2 - math.floor(math.log10(max(high - low, 1e-4))))
     scale = 10.0**digits
     below = math.floor(low * scale) / scale
     above = math.ceil(high * scale) / scale
-    return f"{below:.{digits}f} to {above:.{digits}f}"
+    return f"{below:.{digits}f} to {above:.{digits}f}".replace("-", "−")
