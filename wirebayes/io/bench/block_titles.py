@@ -18,6 +18,7 @@ from wirebayes.io.bench.words import LENGTHS, are_a_statistic, speaks_of_a_quant
 _NUMBER = r"[+\-\u2212]?\d+(?:[.,]\d+)?"
 _MEASURE = re.compile(rf"(?<![\w.,])({_NUMBER})[ _]?([^\W\d_]+)(?=$|[\s,;:.)\]])")
 _LAST = re.compile(rf"(.*?)[\s:=]+({_NUMBER})")
+_MOVED_TO = re.compile(r"\b(moved?|moving|go|going) to\b", re.IGNORECASE)  # moved by, or without a word, is a change
 # Words of titles beside those of quantities; of others, such as Rope 6 mm, a measure may be a thickness.
 _OF_TITLES = {
     "level", "niveau", "phase", "block", "run", "test", "versuch", "messung", "essai", "mesure", "prueba", "prova",
@@ -141,7 +142,7 @@ def _telling(each: Sequence[Said]) -> str | None:
 
 def may_state_a_setting(title: str) -> bool:
     """Whether all words of a title are those of quantities, of units, or of parts of a test."""
-    words = words_in(title)
+    words = words_in(_MOVED_TO.sub("to", title))
     units = {word for word in words if any(quantity_unit(word, role) for role in ROLES)}
     if words & set(LENGTHS):  # of a specimen
         return False

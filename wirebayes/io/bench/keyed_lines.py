@@ -16,14 +16,24 @@ _PAIR = re.compile(
 )
 
 
+# What loggers put before a line: when it was written, and how grave it is.
+_STAMP = re.compile(
+    r"\s*(?P<open>\[)?(?P<stamp>(?:\d{4}-\d\d-\d\d[T ])?\d{1,2}:\d\d:\d\d(?:[.,]\d+)?(?:Z|[+-]\d\d:?\d\d)?"
+    r"|(?(open)\s*\d+[.,]\d+))(?(open)\])(?![\w.:])[\s,;|:-]*(?:\[?(?:DEBUG|INFO|WARN|WARNING|ERROR)\]?[\s,;|:-]+)?"
+)
+_STAMPED = "timestamp"
 _AROUND = re.compile(r"^\s*-\s+(?=[{\"'\w])|[{}'\"]")  # of a list in YAML, of a dict in Python
 
 
 def _pairs(line: str) -> list[tuple[str, str, str]]:
     """Key, value and unit of each pair of a line; none where the line is anything else."""
-    line = _AROUND.sub("", line)
     found = []
     at = 0
+    stamp = _STAMP.match(line)
+    if stamp is not None:
+        found.append((_STAMPED, stamp["stamp"].strip(), ""))
+        at = stamp.end()
+    line = line[:at] + _AROUND.sub("", line[at:])
     while line[at:].strip(" \t,;|"):
         match = _PAIR.match(line, at)
         if match is None:

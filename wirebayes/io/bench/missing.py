@@ -7,7 +7,7 @@ from wirebayes.io.bench.header import may_be, name_and_unit
 from wirebayes.io.bench.quantities import UNITS, Role, quantity_unit
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Undecided
-from wirebayes.io.bench.words import COUNTED, words_in
+from wirebayes.io.bench.words import COUNTED, LETTERS, plain_letters, words_in
 from wirebayes.sentences import listed
 
 # Stands for the length of a turn or a step, or for the time between two readings, which only the user knows.
@@ -103,6 +103,9 @@ def _options(table: RawTable, unread: Sequence[int], role: Role) -> list[str]:
     likely = likely or [i for i in unread if quantity_unit(table.header[i], role)]  # named by nothing but its unit
     if 0 < len(likely) <= _MOST_TO_CHOOSE:
         return [f'--map "{table.header[i]}={role}"' for i in likely]
+    letters = [i for i in unread if plain_letters(table.header[i]) in LETTERS.get(role, ())]
+    if len(letters) == 1:  # t, x, F: names of quantities beside a unit, which is lacking
+        return [f'--map "{table.header[letters[0]]}={role} [{UNITS[role]}]"']
     counts = []
     if role == "displacement":
         counts = [i for i in unread if words_in(table.header[i]) & COUNTED]

@@ -17,6 +17,7 @@ from wirebayes.io.bench.joined import lacking
 from wirebayes.io.bench.quantities import Role, quantity_unit
 from wirebayes.io.bench.sheet import SheetRow, is_number
 from wirebayes.io.bench.table import RawTable
+from wirebayes.io.bench.words import words_in
 
 FEWEST = 3  # columns: two may be two sensors, with a number in their names
 _NUMBER = r"[+\-\u2212]?\d+(?:[.,]\d+)?"
@@ -216,6 +217,8 @@ def _name_of_cells(table: RawTable, across: _Across, read: Role) -> tuple[str, s
     above = {table.above[i] for i in across.values if i < len(table.above)} - {""}
     of_quantity = (text for text in (across.cells, *above) if name_and_unit(text, read).unit)
     name = next(of_quantity, read)
+    if not words_in(name_and_unit(name, read).name):  # nothing but a unit: 0 min [N], 1 min [N]
+        name = f"{read} {name}"
     return name, stated if quantity_unit(stated, read) else ""
 
 
