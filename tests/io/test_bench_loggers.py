@@ -5,6 +5,7 @@ import json
 import pytest
 
 from tests.io.bench_files import convert
+from wirebayes.errors import InputError
 from wirebayes.io.bench.about import About
 from wirebayes.io.bench.header import name_and_unit
 from wirebayes.io.bench.quantities import quantity_unit
@@ -196,3 +197,21 @@ def test_a_letter_of_weights_is_read_where_no_other_column_is_a_force(tmp_path):
     assert of_readings(read(tmp_path, "\n".join(["x (mm),t (s),P (N),n", *rows]))) == [
         pytest.approx(r) for r in READINGS
     ]
+
+
+def test_channels_that_are_read_in_turn_are_told_how_and_read(tmp_path):
+    """A row has either a displacement or a force."""
+    lines = []
+    for hold in (1, 2, 3):
+        for i in range(40):
+            time = 40 * hold + i
+            lines.append(f"{time},{hold:.3f}," if i % 2 == 0 else f"{time},,{5 * hold - 0.01 * i:.3f}")
+    path = tmp_path / "raw.csv"
+    path.write_text("\n".join(["Time (s),Displacement (mm),Force (N)", "39,,0.001", *lines]))
+    with pytest.raises(
+        InputError, match="line 2, column 2 .*: found an empty cell, .* leave all such rows out by --drop-br"
+    ):
+        convert(path, ABOUT, Choices())
+    made = convert(path, ABOUT, Choices(drop_breaks=True))
+    assert [hold.setting for hold in made.experiment.holds] == [1.0, 2.0, 3.0]
+    assert made.experiment.holds[0].readings[0] == pytest.approx(4.99)

@@ -157,7 +157,7 @@ def _check_no_cell_is_empty(rows: list[SheetRow], table: RawTable, columns: Colu
     for row in rows:
         for role, column in columns.items():
             if not row.cells[column.index]:
-                expected = "a value here or in a line above"
+                expected = f"a value here or in a line above{WHERE_MISSING}"
                 if role in ("time", "tension"):
                     expected = f"a number{WHERE_MISSING}"
                 elif role == "temperature":

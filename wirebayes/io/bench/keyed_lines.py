@@ -19,7 +19,7 @@ _PAIR = re.compile(
 # What loggers put before a line: when it was written, and how grave it is.
 _STAMP = re.compile(
     r"\s*(?P<open>\[)?(?P<stamp>(?:\d{4}-\d\d-\d\d[T ])?\d{1,2}:\d\d:\d\d(?:[.,]\d+)?(?:Z|[+-]\d\d:?\d\d)?"
-    r"|(?(open)\s*\d+[.,]\d+))(?(open)\])(?![\w.:])[\s,;|:-]*(?:\[?(?:DEBUG|INFO|WARN|WARNING|ERROR)\]?[\s,;|:-]+)?"
+    r"|(?(open)\s*\d+[.,]\d+|(?!)))(?(open)\])(?![\w.:])[\s,;|:-]*(?:\[?(?:DEBUG|INFO|WARN|WARNING|ERROR)\]?[\s,;|:-]+)?"
 )
 _STAMPED = "timestamp"
 _AROUND = re.compile(r"^\s*-\s+(?=[{\"'\w])|[{}'\"]")  # of a list in YAML, of a dict in Python
