@@ -34,6 +34,7 @@ from wirebayes.report.cells import NONE, median_and_interval, percent, unit_or_d
 from wirebayes.report.drawn import drawn, embedded
 from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.report.pictures.discover import waterfall
+from wirebayes.results.mixture import members_of
 from wirebayes.sentences import listed, p_in_words, quantity, said_beside, spoken
 
 
@@ -248,7 +249,20 @@ def _parameters(folder: Path, found: ExperimentFindings) -> list[Block]:
     caption = "Each parameter before and after, both on all holds."
     if len(rows) < len(final):
         caption += " The smooth curve that stands for what has no name is left out."
-    return [Table(header, rows, caption)]
+    return [Table(header, rows, caption + _of_several(folder / "final", found))]
+
+
+def _of_several(final: Path, found: ExperimentFindings) -> str:
+    """Of how many undecided models the parameters are those of the most probable one; nothing where it is the only."""
+    models = members_of(final)
+    if len(models) == 1:
+        return ""
+    with_effects = " and ".join(spoken(name) for name in found["accepted"]) or "none"
+    share = percent(models[0][0])
+    text = (
+        f"After: those of the most probable of {len(models)} models that stay undecided, with {with_effects} ({share})"
+    )
+    return f" {text}; predict and pose use them all."
 
 
 def _parameters_of(folder: Path) -> dict[str, Parameter]:
