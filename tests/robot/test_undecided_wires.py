@@ -1,5 +1,6 @@
 """Wires whose test leaves undecided which effects they have: draws of all models, each moving the robot as its own."""
 
+import shutil
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -14,9 +15,11 @@ from tests.robot.lines import CORE, line_about
 from wirebayes.cli import main
 from wirebayes.commands import pose_history
 from wirebayes.commands.asked_pose import AskedPose
+from wirebayes.commands.predict import find_posterior
 from wirebayes.commands.wires import draws_of, posterior_of
 from wirebayes.effects import catalogue, effect_named
 from wirebayes.effects.creep import SteadyCreep, SteadyCreepCarried
+from wirebayes.errors import InputError
 from wirebayes.inference.fit import fit_problem
 from wirebayes.io import paper
 from wirebayes.io.run_folder import read_json
@@ -217,3 +220,28 @@ def test_another_probability_is_another_configuration(folder: Path) -> None:
     assert posterior_of(folder, None) != before
     write_mixture(folder, [(".", 0.7, ["strain_stiffening"]), ("undecided/1", 0.3, [])])
     assert posterior_of(folder / "undecided" / "1", None) == folder / "undecided" / "1" / "posterior.nc"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{",
+        "[]",
+        "{}",
+        '{"members": []}',
+        '{"members": [{"folder": "."}]}',
+        '{"members": [{"folder": ".", "probability": "x"}]}',
+    ],
+)
+def test_a_damaged_list_of_models_is_blamed(text: str, tmp_path: Path) -> None:
+    (tmp_path / "posterior.nc").touch()
+    (tmp_path / "mixture.json").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=r"mixture\.json: .*expected what"):
+        draws_of(tmp_path, 10)
+
+
+def test_a_final_posterior_may_lie_in_a_folder_of_any_name(folder: Path, tmp_path: Path) -> None:
+    anywhere = tmp_path / "kept"
+    shutil.copytree(folder, anywhere)
+    name, found = find_posterior(anywhere, None, None)
+    assert (name, found) == ("nylon-1.5m", anywhere)

@@ -259,6 +259,8 @@ def find_posterior(folder: Path, experiment: str | None, model: str | None) -> t
     name = experiment or next(iter(found))
     if name not in found:
         raise InputError(f"--experiment {name}: not in {folder}, expected one of {listed}")
+    if model is None and folder in found[name]:
+        return name, folder
     places = {place.name: place for place in found[name]}
     if model is None and len(places) == 1:
         (only,) = places.values()

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from wirebayes.io.run_folder import read_json, write_json
+from wirebayes.io.run_folder import read_json, stored_results, write_json
 from wirebayes.json_files.mixture import Member, MixtureJson
 
 FILE = "mixture.json"
@@ -25,8 +25,21 @@ def write_mixture(folder: Path, members: Sequence[tuple[str, float, Sequence[str
 
 
 def members_of(folder: Path) -> list[tuple[float, Path]]:
-    """Probability and folder of every model that a posterior stands for; itself alone where nothing is undecided."""
-    if not (folder / FILE).is_file():
+    """Probability and folder of every model that a posterior stands for; itself alone where nothing is undecided.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Raises
+    ------
+    InputError
+        The file that lists them is damaged.
+    """
+    path = folder / FILE
+    if not path.is_file():
         return [(1.0, folder)]
-    content: MixtureJson = read_json(folder / FILE)
-    return [(float(m["probability"]), folder / m["folder"]) for m in content["members"]]
+    content: MixtureJson = read_json(path)
+    with stored_results(path):
+        first, *others = content["members"]
+        return [(float(model["probability"]), folder / model["folder"]) for model in (first, *others)]
