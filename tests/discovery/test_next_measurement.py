@@ -67,6 +67,17 @@ def test_plans_hold_the_displacements_that_were_read_for_the_longest_series() ->
     assert other_measurements(one, True)[3].words == "go to 2 mm in four steps, each held 40 s"
 
 
+def test_plans_of_a_test_that_unloads_go_its_way_and_say_so() -> None:
+    unloads = replace(WHOLE, setting=np.array([1.0, 4.0, 2.0]))
+    again, _, both, finer = other_measurements(unloads, True)
+    assert again.setting.tolist() == both.setting.tolist() == [1.0, 4.0, 2.0, 4.0, 1.0]
+    assert (
+        again.words == "after the last hold, go through the same displacements again in reverse order, each held 40 s"
+    )
+    assert both.words.startswith("go through the same displacements and then through them in reverse order, each hold")
+    assert finer.setting.tolist() == [1.0, 2.5, 4.0, 3.0, 2.0]
+
+
 def test_another_length_is_twice_the_longest_with_steps_scaled_alike() -> None:
     words, more = module._another_length(build([experiments()[1]]))
     first, second = more.samples

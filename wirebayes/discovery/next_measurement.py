@@ -84,6 +84,11 @@ def other_measurements(
     dense = f"{to_be_held(units.time_s * long)} with 25 readings spaced evenly in the logarithm of time"
     back = x[-2::-1] if len(x) > 1 else x
     there_and_back = np.concatenate([x, back])
+    on_way_back = f"unload the wire after the last hold: the same {settings} back{last}"
+    both_ways = f"load and unload over {span}"
+    if (np.diff(x) < 0.0).any():  # the test has a way back already
+        on_way_back = f"after the last hold, go through the same {settings} again in reverse order"
+        both_ways = f"go through the same {settings} and then through them in reverse order"
     halved, finer = _halved(x, span, held)
 
     def plan(words: str, holds: Array, moments: Array) -> MeasurementPlan:
@@ -91,12 +96,12 @@ def other_measurements(
 
     return [
         plan(
-            f"unload the wire after the last hold: the same {settings} back{last}, {held}",
+            f"{on_way_back}, {held}",
             there_and_back,
             times,
         ),
         plan(f"hold each of the {settings} {span} for {dense}", x, log_times),
-        plan(f"load and unload over {span}, each hold {dense}", there_and_back, log_times),
+        plan(f"{both_ways}, each hold {dense}", there_and_back, log_times),
         plan(finer, halved, times),
     ]
 
@@ -115,7 +120,8 @@ def _halved(x: Array, span: str, held: str) -> tuple[Array, str]:
     """Settings with steps half as large, in words too; of a single hold, which has no step, the way to it."""
     if len(x) == 1:
         return x * np.linspace(0.25, 1.0, 4), f"go to {span} in four steps, {held}"
-    halved = np.sort(np.concatenate([x, x[:-1] + 0.5 * np.diff(x)]))
+    halved = np.repeat(x, 2)[:-1]
+    halved[1::2] += 0.5 * np.diff(x)
     return halved, f"take twice as many, half as large steps over {span}"
 
 
