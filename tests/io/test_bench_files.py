@@ -60,7 +60,7 @@ def test_a_file_in_no_known_words_says_how_it_was_read(tmp_path):
     with pytest.raises(wb.InputError, match=named):  # what each unit says; the user decides
         read(path)
     path.write_text("gap (mm),width (mm),when (s),pulling (N)\n" + body())
-    with pytest.raises(wb.InputError, match=r'"HEADER=displacement \[mm\]".*header has no unit\)$'):
+    with pytest.raises(wb.InputError, match=r'"HEADER=displacement \[mm\]".*if the name has one\)$'):
         read(path)
 
 
