@@ -89,7 +89,9 @@ def _how_to_say(table: RawTable, unread: Sequence[int], missing: Sequence[Role])
     if table.nameless:
         options = options.replace("HEADER=", "N=")
         return f"; say which with {options}, N the number of the column"
-    about_units = " (HEADER is one of these names; leave the unit out if the name has one)" if "HEADER=" in options else ""
+    about_units = ""
+    if "HEADER=" in options:
+        about_units = " (HEADER is one of these names; leave the unit out if the name has one)"
     about_counts = ""
     for role, one in _ONE_COUNT.items():
         if one in options:
