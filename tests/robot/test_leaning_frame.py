@@ -11,9 +11,11 @@ from wirebayes.robot.mechanics import rotation, schema
 from wirebayes.robot.self_calibration import answer, faults
 from wirebayes.robot.self_calibration.another_weight import OtherMass
 from wirebayes.robot.self_calibration.equations import Noise, State
+from wirebayes.robot.self_calibration.estimate import estimate
 from wirebayes.robot.self_calibration.holds_creep import creep_of
 from wirebayes.robot.self_calibration.leaning_frame import LeaningFrame, _Lean
 from wirebayes.robot.self_calibration.linearisation import linearised
+from wirebayes.robot.self_calibration.one_cause import explained_by
 from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
 
@@ -104,3 +106,22 @@ def test_what_is_far_less_likely_is_not_named_beside_the_likeliest():
         texts = [one.text for one in faults.fault_notices(robot, OtherMass(2.1, 0.01, evidence), lean, None)]
         assert [any(text.startswith(start) for text in texts) for start in ("a platform of", "a frame")] == named
     assert faults.fault_notices(robot, None, None, None) == []
+
+
+def test_the_error_of_the_loops_stays_as_it_was_found_so_that_likelihoods_compare_with_those_of_sensors():
+    robot, prior, session, readings = _read_leaning(0, [0.03, 0.02])
+    holds = answer.holds_of(robot, session, readings)
+    unknowns = Unknowns(robot, prior, StatedErrors(exit_m=1e-4 * robot.span_m, pose_m=1e-2 * robot.span_m))
+    start = State(np.zeros(unknowns.count), session.position_m, session.rotation, holds.tension_N)
+    found = estimate(unknowns, holds, start)
+    fitted = []
+
+    class Recorded(_Lean):
+        def changed(self, found, holds, by):
+            fitted.append(found.unknowns.errors.joint_m)
+            return super().changed(found, holds, by)
+
+    explained_by(Recorded(), found, holds)
+    assert unknowns.errors.joint_m is None
+    assert fitted
+    assert set(fitted) == {found.noise.joint_m}

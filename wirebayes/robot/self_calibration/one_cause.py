@@ -1,6 +1,6 @@
 """Fits with one cause more, which alone may explain what a calibration's readings contradict."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -62,6 +62,7 @@ def explained_by(
     holds : Holds
     progress : function of a share between 0 and 1
     """
+    found = replace(found, unknowns=_with_error_of_loops(found))
     for part in shares_of(progress, _TRIES):
         change, covariance = _least_squares(found, cause.slopes(found), cause.usual)
         if not _far(change, covariance):  # nor where the readings do not tell it
@@ -73,6 +74,13 @@ def explained_by(
     if not found.converged or trust(found) < SIGNIFICANT or found.noise.balance > _HELD_BY:
         return None
     return Explained(found, covariance)
+
+
+def _with_error_of_loops(found: RobotPosterior) -> Unknowns:
+    """The unknowns with the error of the loops as found, as `sensors` have it: else likelihoods do not compare."""
+    errors = found.unknowns.errors
+    stated = found.noise.joint_m if errors.joint_m is None else errors.joint_m
+    return replace(found.unknowns, errors=replace(errors, joint_m=stated))
 
 
 def _far(change: Floats, covariance: Floats) -> bool:
