@@ -6,6 +6,7 @@ from datetime import datetime, timedelta
 import pytest
 
 from tests.io.bench_files import convert
+from wirebayes.cli.import_bench import _ask
 from wirebayes.errors import InputError
 from wirebayes.io.bench.about import About
 from wirebayes.io.bench.undecided import Choices, Undecided
@@ -206,6 +207,10 @@ def test_readings_without_a_clock_may_be_counted(tmp_path):
         Undecided, match=r'say which with --map "No.=time \[0.5 s\]" \(with the time between two readings'
     ):
         read(tmp_path, header, lines)
+    with pytest.raises(
+        InputError, match=r'found numbers that count the readings, expected --map "No.=time \[0.5 s\]", with'
+    ):
+        read(tmp_path, header, lines, mapping=("No.=time",))
     made = read(tmp_path, header, lines, mapping=("No.=time [30 s]",), time_since="test")
     assert [list(hold.time_s[:3]) for hold in made.experiment.holds] == [[0.0, 30.0, 60.0]] * 3
 
@@ -216,3 +221,10 @@ def test_columns_in_the_unit_of_what_is_missing_are_named_to_be_copied(tmp_path)
     with pytest.raises(Undecided, match=r'say which with --map "Gross \[N\]=tension" or --map "Net \[N\]=tension"$'):
         read(tmp_path, header, lines)
     assert_is_the_test(read(tmp_path, header, lines, mapping=("Net [N]=tension",)))
+
+
+def test_a_person_at_a_terminal_sees_options_that_can_be_copied(monkeypatch, capsys):
+    question = Undecided("raw.csv: found no unit", "the unit of time", {"--map My time=time [s]": "s"})
+    monkeypatch.setattr("typer.prompt", lambda *_, **__: 1)
+    assert _ask(question) == "--map My time=time [s]"
+    assert '  1  s  (--map "My time=time [s]")' in capsys.readouterr().err

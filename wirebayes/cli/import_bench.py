@@ -117,10 +117,12 @@ def import_command(
 
 def _ask(question: "Undecided") -> str:
     """Ask a person on the terminal; the number chosen is the answer's."""
+    from wirebayes.io.bench.undecided import quoted
+
     options = list(question.answers)
     typer.echo(f"{question.found}. Please say {question.question}:", err=True)
     for i, (option, meaning) in enumerate(question.answers.items(), start=1):
-        typer.echo(f"  {i}  {meaning}  ({option})", err=True)
+        typer.echo(f"  {i}  {meaning}  ({quoted(option)})", err=True)
     while True:
         number = typer.prompt("Number", type=int, err=True)
         if 1 <= number <= len(options):

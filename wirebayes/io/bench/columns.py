@@ -19,7 +19,7 @@ from wirebayes.io.bench.header import (
     name_and_unit,
 )
 from wirebayes.io.bench.mapping import IGNORE, mapped_columns
-from wirebayes.io.bench.missing import check_settings_of_runs, missing_columns
+from wirebayes.io.bench.missing import check_settings_of_runs, missing_columns, what_is_counted
 from wirebayes.io.bench.multiples import multiple_of_unit, unit_in_header
 from wirebayes.io.bench.numerals import is_count
 from wirebayes.io.bench.quantities import COMMON, OF_SAMPLE, ROLES, TONS, UNITS, Role, Unit, is_ton, quantity_unit
@@ -307,6 +307,11 @@ def _no_unit(table: RawTable, index: int, role: Role) -> InputError:
     bracket = UNIT_IN_BRACKETS.match(header)
     foreign = bracket[2] if bracket else ""
     where = table.where(table.header_line, index)
+    counted = what_is_counted(table, index, role)
+    if counted:
+        found, instead = counted
+        expected = f"{quoted(f'{map_to} [0.5 {usual}]')}, with {instead} in place of 0.5 {usual}"
+        return InputError(f"{where}: found {found}, expected {expected}")
     if role == "tension" and (is_ton(foreign) or is_ton(table.units[index])):
         tons = {f"{map_to} [{name}]": meaning for name, meaning in TONS.items()}
         return Undecided(f"{where}: found tons, which may be of 2000 lb, of 2240 lb or of 1000 kg", "which", tons)

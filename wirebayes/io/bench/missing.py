@@ -7,7 +7,7 @@ from wirebayes.io.bench.header import may_be, name_and_unit
 from wirebayes.io.bench.quantities import UNITS, Role, quantity_unit
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Undecided
-from wirebayes.io.bench.words import COUNTED, LETTERS, plain_letters, words_in
+from wirebayes.io.bench.words import COUNTED, LETTERS, plain_letters, speaks_of, words_in
 from wirebayes.sentences import listed
 
 # Stands for the length of a turn or a step, or for the time between two readings, which only the user knows.
@@ -120,6 +120,25 @@ def _options(table: RawTable, unread: Sequence[int], role: Role) -> list[str]:
 
 def _stated_by_name(role: Role) -> str:
     return f'--map "HEADER={role} [{UNITS[role]}]"'
+
+
+def what_is_counted(table: RawTable, index: int, role: Role) -> tuple[str, str] | None:
+    """What a column without a unit counts in place of a quantity, and what one of it is; None where it does not count.
+
+    Parameters
+    ----------
+    table : RawTable
+    index : int
+        Of the column.
+    role : str
+        The quantity.
+    """
+    header = table.header[index]
+    if role == "displacement" and not words_in(header).isdisjoint(COUNTED):
+        return "steps or turns that are counted", _ONE_OF[role]
+    if role == "time" and not speaks_of(header, role) and _counts_rows(table, index):
+        return "numbers that count the readings", _ONE_OF[role]
+    return None
 
 
 def _counts_rows(table: RawTable, index: int) -> bool:
