@@ -228,3 +228,10 @@ def test_a_person_at_a_terminal_sees_options_that_can_be_copied(monkeypatch, cap
     monkeypatch.setattr("typer.prompt", lambda *_, **__: 1)
     assert _ask(question) == "--map My time=time [s]"
     assert '  1  s  (--map "My time=time [s]")' in capsys.readouterr().err
+
+
+def test_units_behind_the_sign_that_parts_cells_belong_to_the_names_before_them(tmp_path):
+    lines = [f"{time},{x},{y}" for time, x, y in ROWS]
+    assert_is_the_test(read(tmp_path, ["Time, s,Displacement, mm,Force, N"], lines))
+    with pytest.raises(InputError):  # readings of six columns
+        read(tmp_path, ["Time, s,Displacement, mm,Force, N"], [f"{line},1,2,3" for line in lines])

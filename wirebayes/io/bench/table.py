@@ -143,7 +143,7 @@ def find_table(sheet: Sheet) -> RawTable:
     if not _is_header(head) or _is_title(head, shown):
         return _without_header(sheet, first)
     _check_names_are_short(sheet, head)
-    head = _beside_row_names(head, rows[first:])
+    head = _joined_to_units(_beside_row_names(head, rows[first:]), rows[first:])
     width = max(len(row.cells) for row in (head, *shown))
     header = _padded(head.cells, width)
     names = _padded(others[-1].cells, width) if others else ()
@@ -180,6 +180,15 @@ def _beside_row_names(head: SheetRow, below: Sequence[SheetRow]) -> SheetRow:
     if not one_more or [row.cells[0] for row in readings] != numbers:
         return head
     return replace(head, cells=("", *head.cells))
+
+
+def _joined_to_units(head: SheetRow, below: Sequence[SheetRow]) -> SheetRow:
+    """The header with each unit beside its name, where the sign between cells parts them: ``Time, s,Force, N``."""
+    names, units = head.cells[::2], head.cells[1::2]
+    in_pairs = len(names) == len(units) and all(map(_is_a_unit, units)) and not any(map(_is_a_unit, names))
+    if not in_pairs or any(len(row.cells) != len(names) for row in below if row.may_be_a_reading):
+        return head
+    return replace(head, cells=tuple(f"{name} [{unit}]" for name, unit in zip(names, units, strict=True)))
 
 
 def _padded(cells: Sequence[str], width: int) -> tuple[str, ...]:
