@@ -100,12 +100,12 @@ def _about(unknowns, holds, noise, state):
 
 
 def test_what_is_far_less_likely_is_not_named_beside_the_likeliest():
-    robot = schema.read_robot_file("hangprinter-4")
     lean = LeaningFrame(np.array([0.0, 0.0, -1.0]), 0.03, 0.001, evidence=100.0)
     for evidence, named in ((90.0, [False, True]), (97.0, [True, True]), (110.0, [True, False])):
-        texts = [one.text for one in faults.fault_notices(robot, OtherMass(2.1, 0.01, evidence), lean, None)]
+        mass = OtherMass(2.1, 0.01, 2.0, evidence)
+        texts = [one.text for one in faults.fault_notices([mass, lean], None)]
         assert [any(text.startswith(start) for text in texts) for start in ("a platform of", "a frame")] == named
-    assert faults.fault_notices(robot, None, None, None) == []
+    assert faults.fault_notices([], None) == []
 
 
 def test_the_error_of_the_loops_stays_as_it_was_found_so_that_likelihoods_compare_with_those_of_sensors():

@@ -91,6 +91,22 @@ def test_a_mass_that_is_wrong_is_named_in_place_of_all_sensors(seed, times):
     assert not any("several tension sensors" in text for text in texts)
 
 
+def test_a_centre_of_mass_that_is_wrong_is_named_in_place_of_all_sensors():
+    robot, prior, session, rng = _session(0, sd=0.005)
+    readings = _read(robot, prior, session, rng)
+    off = 0.1 * robot.size_m * np.array([1.0, -0.5, 0.0])
+    stated = replace(robot, centre_of_mass_m=robot.centre_of_mass_m + off)
+    texts = _misfits(_reported(stated, prior, session, readings))
+    named = r"a centre of mass at \((.*?)\) mm would explain .* file says \((.*?)\) mm"
+    found = [re.match(named, text) for text in texts]
+    centre, told = next(one.groups() for one in found if one)
+    at, sd = 1e-3 * np.array([[float(value) for value in part.split(" +- ")] for part in centre.split(", ")]).T
+    assert (np.abs(at - robot.centre_of_mass_m) < 4 * sd + 0.005 * np.abs(at)).all()
+    assert (4 * sd[:2] < np.abs(off[:2])).all()
+    np.testing.assert_allclose([float(part) for part in told.split(", ")], 1e3 * stated.centre_of_mass_m, rtol=0.01)
+    assert not any("tension sensor" in text or "a frame that leans" in text for text in texts)
+
+
 def test_errors_of_sensors_are_not_taken_for_another_mass():
     robot, prior, session, rng = _session(0, sd=0.005)
     readings = _read(robot, prior, session, rng).reshape(-1, robot.legs) + 20.0 * np.arange(robot.legs)

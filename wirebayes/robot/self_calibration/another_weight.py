@@ -6,7 +6,6 @@ from wirebayes.numeric.batches import batch_last
 from wirebayes.numeric.typing import Floats
 from wirebayes.progress import ShareDone
 from wirebayes.robot.mechanics import statics
-from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.self_calibration.equations import Holds, State, by_carried
 from wirebayes.robot.self_calibration.one_cause import explained_by
 from wirebayes.robot.self_calibration.posterior import RobotPosterior
@@ -18,24 +17,28 @@ _LEAST = 0.1  # of a mass: a platform that weighs less than a tenth of what was 
 
 @dataclass(frozen=True)
 class OtherMass:
-    """A mass that would explain what contradicts, and its standard deviation, kg.
+    """A mass that would explain what contradicts.
 
     Attributes
     ----------
+    mass_kg, sd_kg : float
+    stated_kg : float
+        As the robot's file says.
     evidence : float
         Log density of the readings with it.
     """
 
     mass_kg: float
     sd_kg: float
+    stated_kg: float
     evidence: float
 
-    def in_words(self, robot: Robot) -> str:
+    def in_words(self) -> str:
         """What to do about it."""
         return (
             f"a platform of {short(self.mass_kg, 4)} +- {short(self.sd_kg, 2)} kg would explain what contradicts, the "
-            f"robot's file says {short(robot.mass_kg, 4)} kg: weigh it with all that it carries, or check the scale of "
-            "the tension sensors; do not use these values"
+            f"robot's file says {short(self.stated_kg, 4)} kg: weigh it with all that it carries, or check the scale "
+            "of the tension sensors; do not use these values"
         )
 
 
@@ -52,7 +55,8 @@ def other_mass(found: RobotPosterior, holds: Holds, progress: ShareDone = lambda
     if explained is None:
         return None
     mass = explained.found.unknowns.robot.mass_kg
-    return OtherMass(mass, mass * float(explained.covariance[0, 0]) ** 0.5, explained.found.evidence)
+    sd = mass * float(explained.covariance[0, 0]) ** 0.5
+    return OtherMass(mass, sd, found.unknowns.robot.mass_kg, explained.found.evidence)
 
 
 class _Mass:

@@ -142,7 +142,7 @@ def calibration_report(
                 *_warnings(verdict),
                 *tension_notices(robot, session, readings),
                 *([] if verdict.usable else _columns(search)),
-                *fault_notices(robot, search.mass, search.lean, search.at_fault),
+                *fault_notices(search.explain, search.at_fault),
                 *search.wires,
                 *wire_notices(robot, prior.line, session.duration_s, s, verdict.usable),
             ]

@@ -10,10 +10,9 @@ from scipy.special import chdtr, fdtrc
 from wirebayes.numeric.typing import Bools
 from wirebayes.progress import Progress
 from wirebayes.result_warnings import Notice
-from wirebayes.robot.self_calibration.another_weight import OtherMass, other_mass
 from wirebayes.robot.self_calibration.equations import Holds
 from wirebayes.robot.self_calibration.estimate import estimate, progress_of
-from wirebayes.robot.self_calibration.leaning_frame import LeaningFrame, leaning_frame
+from wirebayes.robot.self_calibration.faults import Explanation, explanations
 from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.residuals import lost, misfit, trust, usual_joint
 from wirebayes.robot.self_calibration.seeds import best, near_requests
@@ -50,10 +49,8 @@ class Searched:
         Probability of readings and references that contradict model and priors as much.
     at_fault : Suspects or None
         Which sensor would explain what contradicts; None where nothing does, or nothing that a sensor could.
-    mass : OtherMass or None
-        Of the platform, with which nothing would contradict.
-    lean : LeaningFrame or None
-        Of the robot's frame, with which nothing would contradict.
+    explain : tuple of Explanation
+        Of platform and frame, with each of which nothing would contradict.
     wires : tuple of Notice
         How unlike what is stated wires would be with which nothing would contradict.
     inexact : bool
@@ -75,8 +72,7 @@ class Searched:
     requested: bool
     too_near: bool = False
     closer: float = 1.0
-    mass: OtherMass | None = None
-    lean: LeaningFrame | None = None
+    explain: tuple[Explanation, ...] = ()
     wires: tuple[Notice, ...] = ()
 
 
@@ -109,8 +105,7 @@ def searched(
     p = trust(found)
     at_fault = _sensor_at_fault(found, holds, p, progress)
     tells = _contradicts(found, p) and _carries(holds)
-    mass = other_mass(found, holds, progress_of(progress, "mass")) if tells else None
-    lean = leaning_frame(found, holds, progress_of(progress, "lean")) if tells else None
+    explain = explanations(found, holds, progress) if tells else ()
     wires = unlike_wires(found) if found.converged and p < SIGNIFICANT else ()
     inexact = unknowns.errors.joint_m == 0 and not (found.converged and p >= SIGNIFICANT)
     if inexact and misfit(found) < _GROSS:
@@ -120,7 +115,7 @@ def searched(
         if other.converged or not found.converged:
             found = other
     too_near = too_good and not requested
-    return Searched(found, holds, p, at_fault, inexact, requested, too_near, closer, mass, lean, wires)
+    return Searched(found, holds, p, at_fault, inexact, requested, too_near, closer, explain, wires)
 
 
 def _sensor_at_fault(found: RobotPosterior, holds: Holds, p: float, progress: Progress) -> Suspects | None:
