@@ -11,6 +11,7 @@ from wirebayes.effects import effect_named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.build import build
+from wirebayes.model.scales import scales_of
 from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.simulation.synthetic import Bench, Truth
 
@@ -28,7 +29,7 @@ def hung(weights_N: list[float], truth: Truth = Truth(WIRE), seed: int = 1) -> E
 
 def evidence(block: LaplaceFit, name: str) -> float:
     """Log Bayes factor of an effect, refitted."""
-    effect = effect_named(name).on([e.protocol() for e in block.experiments])
+    effect = effect_named(name).on([e.protocol() for e in block.experiments], scales_of(block.experiments).range_mm)
     found = scan(expand(block.target, block.z, probes(effect)))
     best = int(np.argmax(found.effects[0]))
     per_delta = 1.0 / float(found.norm[0, best])

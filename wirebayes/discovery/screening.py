@@ -21,6 +21,7 @@ from wirebayes.inference.climb import climb
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.model.replicate import readings as replicate
 from wirebayes.model.sample import LENGTH_EXPONENT
+from wirebayes.model.scales import scales_of
 from wirebayes.numeric.log_sum import or_impossible
 from wirebayes.numeric.typing import Array, Ints
 from wirebayes.wire.effect import Effect, EventEffect, Kinds
@@ -111,10 +112,17 @@ def _variants(kind: type[Effect], block: LaplaceFit, tests: Sequence[Protocol]) 
         return _of_the_bench(kind, block, tests)
     if issubclass(kind, EventEffect):
         return _events(kind, block, several_tests=len(tests) > 1)
-    found = kind.variants([e.protocol() for e in block.experiments])
+    own = [e.protocol() for e in block.experiments]
+    found = [v.on(own, _range_mm(block)) for v in kind.variants(own)]
     if any(name.startswith(LENGTH_EXPONENT) for name in block.target.problem.names):
         return [v for v in found if v.key != _LEARNED_EXPONENT]
-    return list(found)
+    return found
+
+
+def _range_mm(block: LaplaceFit) -> float:
+    """How far the wires of a block are stretched."""
+    scales = block.target.problem.scales or scales_of(block.experiments)
+    return scales.range_mm
 
 
 def _events(kind: type[EventEffect], block: LaplaceFit, several_tests: bool) -> list[Effect]:
@@ -136,7 +144,7 @@ def _of_the_bench(kind: type[Effect], block: LaplaceFit, tests: Sequence[Protoco
         here = [e.protocol() for e in block.experiments if e.control == control]
         alike = [p for p in tests if p.control == control]
         forms_here = kind.variants(here) if here else []
-        out += [v.on(alike).under(control if len(controls) > 1 else None) for v in forms_here]
+        out += [v.on(alike, _range_mm(block)).under(control if len(controls) > 1 else None) for v in forms_here]
     return out
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from wirebayes.numeric.distributions import HalfNormal, Normal, TruncatedNormal
+from wirebayes.numeric.means import geometric_mean
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext, Own, Typical
 from wirebayes.wire.protocol import Protocol
@@ -15,21 +16,42 @@ _DEPENDENT = ("k1", "B", "U", "N")  # parameters that may depend on the length
 _OF_EXPONENT = {"U": "B", "N": "k2"}  # the parameter whose unit depends on an exponent
 
 
+@dataclass(frozen=True)
 class StrainStiffening(Effect):
-    """τ = k1 s (1 + c s)."""
+    """τ = k1 s (1 + c s).
+
+    Attributes
+    ----------
+    most : float
+        The largest strain of the tests that it is looked for in, which its prior refers to: a rubber band is stretched
+        by its length and a steel rope by a thousandth of it.
+    """
+
+    most: float = 0.01
 
     name = "strain_stiffening"
     pattern = "elastic curve"
     place = "strain"
     formula = "stiffening"
     scope = "material"
-    # at a strain of a hundredth the tension is a fifth larger or smaller
-    amplitudes = (Amplitude("c", "-", 0.0, Normal(0.0, 20.0)),)
+    # where the wire is stretched most, the tension is a quarter larger or smaller
+    amplitudes = (Amplitude("c", "-", 0.0, Normal(0.0, 0.25 / most)),)
     sentence = "The wire becomes stiffer (or softer) the more it is strained."
     shows = "curved in displacement, constant within a hold"
 
     def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value * (1.0 + own["c"] * value)
+
+    def __post_init__(self) -> None:
+        (amplitude,) = type(self).amplitudes
+        own = replace(amplitude, prior=Normal(0.0, 0.25 / self.most))
+        object.__setattr__(self, "amplitudes", (own,))
+
+    def on(self, protocols: Sequence[Protocol], range_mm: float) -> Effect:
+        if not protocols:
+            return self
+        length_mm = geometric_mean(p.length_mm for p in protocols)
+        return StrainStiffening(range_mm / length_mm).under(self.control)
 
 
 class Toe(Effect):

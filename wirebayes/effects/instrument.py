@@ -85,7 +85,7 @@ class SensorNonlinearity(Effect):
     def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value * (1.0 + own["a"] * value)
 
-    def on(self, protocols: Sequence[Protocol]) -> Effect:
+    def on(self, protocols: Sequence[Protocol], range_mm: float) -> Effect:
         """Under weights the unit of a displacement is one step of many, and the prior speaks of what is read."""
         if not protocols or any(p.control == "displacement" for p in protocols):
             return self
@@ -182,7 +182,7 @@ class ScrewError(Effect):
     def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value + own["a"] * np.cos(2.0 * np.pi / own["P"] * hold.displacement_mm + own["phi"])
 
-    def on(self, protocols: Sequence[Protocol]) -> Effect:
+    def on(self, protocols: Sequence[Protocol], range_mm: float) -> Effect:
         longest = max((_half_range(p) for p in protocols), default=0.0)
         if self.of_several or longest < _LEAST * _SHORTEST:
             return self

@@ -19,7 +19,7 @@ from wirebayes.numeric.means import geometric_mean
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.effect import Amplitude, Effect, Typical
 from wirebayes.wire.model import Model, tension_reference
-from wirebayes.wire.protocol import Control
+from wirebayes.wire.protocol import Control, Protocol
 
 FINEST = 1e-5  # of the largest tension: no load cell resolves less, and data without any noise need a floor
 _POSITIVE = {"k1", "B", "U", "k2", "N", "sensor_sd", "setting_sd"}
@@ -53,16 +53,14 @@ def build(
     materials = by_material(experiments)
     scales = scales or scales_of(experiments)
     several = len(experiments) > 1
-    effects = [
-        effect.on([e.protocol() for e in experiments if effect.acts_on(e.name, e.control)]) for effect in effects
-    ]
+    effects = [effect.on(_acted_on(effect, experiments), scales.range_mm) for effect in effects]
     distributions: dict[str, Any] = {}
     samples: list[Sample] = []
     for material, members in materials.items():
         mark = f"[{material}]" if len(materials) > 1 else ""
         distributions |= _material_priors(members, effects, mark, spec, scales)
         samples += _samples(members, [effect.referred(scales.hold_s) for effect in effects], spec, scales)
-    distributions |= _instrument_priors(experiments, effects)
+    distributions |= _instrument_priors(experiments, effects, scales)
     for experiment in experiments:
         mark = f"[{experiment.name}]" if several else ""
         distributions |= _sample_priors(experiment, effects, mark, spec, scales)
@@ -154,7 +152,12 @@ def _material_priors(
     return out
 
 
-def _instrument_priors(experiments: Sequence[Experiment], effects: Sequence[Effect]) -> dict[str, Any]:
+def _acted_on(effect: Effect, experiments: Sequence[Experiment]) -> list[Protocol]:
+    """What is done in the tests that an effect acts on."""
+    return [e.protocol() for e in experiments if effect.acts_on(e.name, e.control)]
+
+
+def _instrument_priors(experiments: Sequence[Experiment], effects: Sequence[Effect], scales: Scales) -> dict[str, Any]:
     """Priors of what does not belong to the wire: steps and weights are read by different instruments, each its own."""
     controls = dict.fromkeys(e.control for e in experiments)
     out: dict[str, Any] = {}
@@ -165,8 +168,8 @@ def _instrument_priors(experiments: Sequence[Experiment], effects: Sequence[Effe
         if len(controls) > 1 and effect.scope != "event":
             marks = [f"[{control}]" for control in controls if effect.control in (None, control)]
         for mark in marks:
-            read = [e for e in experiments if mark in ("", f"[{e.control}]") and effect.acts_on(e.name, e.control)]
-            own = effect.on([e.protocol() for e in read])
+            read = [e for e in experiments if mark in ("", f"[{e.control}]")]
+            own = effect.on(_acted_on(effect, read), scales.range_mm)
             for column, amplitude in _amplitudes([own]):
                 if not amplitude.of_each_test:
                     out[f"{column}{mark}"] = amplitude.prior

@@ -307,8 +307,8 @@ class Effect:
         swapped = control == "force" and cls.place == "reading"
         return amplitude.unit.replace("N", "mm") if swapped else amplitude.unit
 
-    def on(self, protocols: Sequence[Protocol]) -> "Effect":
-        """The effect with the priors that it has for some tests; itself unless they depend on these."""
+    def on(self, protocols: Sequence[Protocol], range_mm: float) -> "Effect":
+        """The effect with the priors that it has for some tests, stretched so far; itself unless they depend on it."""
         return self
 
     def shapes_tried(self) -> list[dict[str, float]]:
