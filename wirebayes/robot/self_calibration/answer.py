@@ -143,7 +143,7 @@ def calibration_report(
                 *tension_notices(robot, session, readings),
                 *([] if verdict.usable else _columns(search)),
                 *fault_notices(search.explain, search.at_fault),
-                *search.wires,
+                *search.unlike,
                 *wire_notices(robot, prior.line, session.duration_s, s, verdict.usable),
             ]
         ),

@@ -51,7 +51,7 @@ class Searched:
         Which sensor would explain what contradicts; None where nothing does, or nothing that a sensor could.
     explain : tuple of Explanation
         Of platform and frame, with each of which nothing would contradict.
-    wires : tuple of Notice
+    unlike : tuple of Notice
         How unlike what is stated wires would be with which nothing would contradict.
     inexact : bool
         Joint values that were taken as exact are not.
@@ -73,7 +73,7 @@ class Searched:
     too_near: bool = False
     closer: float = 1.0
     explain: tuple[Explanation, ...] = ()
-    wires: tuple[Notice, ...] = ()
+    unlike: tuple[Notice, ...] = ()
 
 
 def searched(
@@ -106,7 +106,7 @@ def searched(
     at_fault = _sensor_at_fault(found, holds, p, progress)
     tells = _contradicts(found, p) and _carries(holds)
     explain = explanations(found, holds, progress) if tells else ()
-    wires = unlike_wires(found) if found.converged and p < SIGNIFICANT else ()
+    unlike = unlike_wires(found) if found.converged and p < SIGNIFICANT else ()
     inexact = unknowns.errors.joint_m == 0 and not (found.converged and p >= SIGNIFICANT)
     if inexact and misfit(found) < _GROSS:
         # how far from exact the joint values are tells more than that there is no answer
@@ -115,7 +115,7 @@ def searched(
         if other.converged or not found.converged:
             found = other
     too_near = too_good and not requested
-    return Searched(found, holds, p, at_fault, inexact, requested, too_near, closer, explain, wires)
+    return Searched(found, holds, p, at_fault, inexact, requested, too_near, closer, explain, unlike)
 
 
 def _sensor_at_fault(found: RobotPosterior, holds: Holds, p: float, progress: Progress) -> Suspects | None:
