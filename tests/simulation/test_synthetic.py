@@ -129,6 +129,27 @@ def test_effect_options_name_hold_and_amplitude():
     assert effect_option("superposition")[1] == {}
 
 
+WEIGHTS = ["--weights", "1,2,3,4,5,6"]
+
+
+@pytest.mark.parametrize(
+    ("effect", "control"),
+    [
+        ("strain_stiffening.c=30", []),
+        ("strain_stiffening.c=30", WEIGHTS),
+        ("sensor_nonlinearity.a=0.05", []),
+        ("sensor_nonlinearity.a=0.05", WEIGHTS),
+        ("screw_error.a=0.05", []),
+    ],
+)
+def test_effects_whose_priors_follow_the_test_are_simulated(effect, control, tmp_path):
+    """A sample's model has them with priors of its own, and they are the same effects."""
+    assert main(["simulate", "--effect", effect, *control, "--output", str(tmp_path / "out")]) == 0
+    name, value = effect.split("=")
+    truth = read_json(tmp_path / "out" / "truth.json")["experiments"]["wire"]["parameters"]
+    assert truth[name] == float(value)
+
+
 def test_an_effect_of_ones_own_is_written_into_the_readings(tmp_path):
     own = str(Path(__file__).parents[2] / "docs" / "own_effect.py")
     wire = ["--parameter", "sensor_sd=1e-6", "--parameter", "setting_sd=1e-6", "--parameter", "k1=700"]

@@ -57,7 +57,8 @@ def without_trace(made: Simulated, effects: Sequence[Effect]) -> list[Effect]:
     """
     out = []
     for effect in effects:
-        acting = [sample for sample in made.problem.samples if effect in sample.model.effects]
+        # by its key: a sample's model may have it with a prior of its own
+        acting = [s for s in made.problem.samples if effect.key in {own.key for own in s.model.effects}]
         if not any(_is_neutral_or_shows(made, sample, effect) for sample in acting):
             out.append(effect)
     return out
