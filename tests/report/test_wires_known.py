@@ -30,6 +30,14 @@ def test_wires_of_the_robots_own_file_are_not_told_to_be_known_from_a_posterior(
     assert wires_known(wires) == expected
 
 
+@pytest.mark.parametrize(("models", "said"), [([["toe"], []], " with some of toe."), ([["toe"]], " with toe.")])
+def test_effects_that_not_every_draw_has_are_some(models, said):
+    """Models that differ on the bench alone are one in a robot, and every draw has its effects."""
+    wires = {"draws": 200, "tested_length_mm": 2000.0, "effects": ["toe"], "legs": ["line"], "lines": ["line"]}
+    shares = [{"effects": effects, "share": 1.0 / len(models)} for effects in models]
+    assert wires_known({**wires, "undecided": {"line": shares}}) == f"{POSTERIOR}{said}"
+
+
 @pytest.mark.parametrize(("low", "high", "said"), [(2.299, 2.301, "2.3"), (2.24, 2.26, "2.2 … 2.3")])
 def test_errors_that_read_the_same_are_said_once(low, high, said):
     assert from_to(low, high) == said

@@ -22,7 +22,7 @@ from wirebayes.prediction.table import (
 )
 from wirebayes.result_warnings import Notice, to_json
 from wirebayes.results import read_back
-from wirebayes.results.mixture import members_of
+from wirebayes.results.mixture import load_models
 from wirebayes.results.read_back import Stored
 from wirebayes.strict.columns import is_table
 from wirebayes.strict.files import PathLike
@@ -182,9 +182,9 @@ def stored_posteriors(
     """
     if isinstance(posterior, str | os.PathLike):
         name, folder = find_posterior(Path(posterior), experiment, model)
-        return _members(folder, name, own_effects)
+        return load_models(folder, name, own_effects)
     if isinstance(posterior, Posterior):
-        return _members(posterior.folder, experiment, posterior.own_effects)
+        return load_models(posterior.folder, experiment, posterior.own_effects)
     if isinstance(posterior, Findings):
         several: Mapping[str, Posterior] = posterior.plain if model == "plain" else posterior.final
     elif isinstance(posterior, Posteriors):
@@ -192,15 +192,7 @@ def stored_posteriors(
     else:
         raise InputError(f"posterior: found {type(posterior).__name__}, expected a Posterior, Findings or a folder")
     one = one_of(several, experiment)
-    return _members(one.folder, None, one.own_effects)
-
-
-def _members(folder: Path, experiment: str | None, own_effects: Path | None) -> list[tuple[float, Stored]]:
-    """The posteriors of a folder with their probabilities."""
-    members = []
-    for probability, place in members_of(folder):
-        members.append((probability, read_back.load_posterior(place, experiment, own_effects)))
-    return members
+    return load_models(one.folder, None, one.own_effects)
 
 
 def one_of(posteriors: Mapping[str, Posterior], experiment: str | None) -> Posterior:

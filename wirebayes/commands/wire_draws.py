@@ -12,7 +12,7 @@ from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.means import geometric_mean
 from wirebayes.numeric.typing import Floats
 from wirebayes.results import read_back
-from wirebayes.results.mixture import members_of
+from wirebayes.results.mixture import load_models
 from wirebayes.results.read_back import Stored
 from wirebayes.robot.mechanics.draws import CORE, LENGTH_EXPONENT, WireDraws, material
 from wirebayes.robot.mechanics.undecided_models import draws_of_each, models_together, that_go_together
@@ -42,11 +42,7 @@ def read_wires(folder: Path, count: int, experiment: str | None = None, own_effe
     below = sorted(str(path.parent) for path in folder.glob("*/**/posterior.nc"))
     if below and not (folder / POSTERIOR).is_file():
         raise InputError(f"{folder}: found no posterior.nc in it, expected one of {', '.join(below)}")
-    models = [
-        (probability, read_back.load_posterior(place, experiment, own_effects))
-        for probability, place in members_of(folder)
-    ]
-    return draws_of_models(models, str(folder), count)
+    return draws_of_models(load_models(folder, experiment, own_effects), str(folder), count)
 
 
 def draws_of_models(models: Sequence[tuple[float, Stored]], where: str, count: int) -> WireDraws:

@@ -14,6 +14,7 @@ from wirebayes.wire.protocol import Protocol
 
 _DEPENDENT = ("k1", "B", "U", "N")  # parameters that may depend on the length
 _OF_EXPONENT = {"U": "B", "N": "k2"}  # the parameter whose unit depends on an exponent
+_BENT = 0.25  # share by which the tension is larger or smaller where a wire is stretched most
 
 
 @dataclass(frozen=True)
@@ -34,8 +35,7 @@ class StrainStiffening(Effect):
     place = "strain"
     formula = "stiffening"
     scope = "material"
-    # where the wire is stretched most, the tension is a quarter larger or smaller
-    amplitudes = (Amplitude("c", "-", 0.0, Normal(0.0, 0.25 / most)),)
+    amplitudes = (Amplitude("c", "-", 0.0, Normal(0.0, _BENT / most)),)
     sentence = "The wire becomes stiffer (or softer) the more it is strained."
     shows = "curved in displacement, constant within a hold"
 
@@ -44,7 +44,7 @@ class StrainStiffening(Effect):
 
     def __post_init__(self) -> None:
         (amplitude,) = type(self).amplitudes
-        own = replace(amplitude, prior=Normal(0.0, 0.25 / self.most))
+        own = replace(amplitude, prior=Normal(0.0, _BENT / self.most))
         object.__setattr__(self, "amplitudes", (own,))
 
     def on(self, protocols: Sequence[Protocol], range_mm: float) -> Effect:

@@ -32,7 +32,7 @@ def draws(target: LogPosterior, found: Optimum, rng: Generator, n: int = 1000, w
     n : int
         Number of draws.
     wanted : float, optional
-        Effective draws before importance sampling stops; those of a decision where nothing is said. Where all its
+        Effective draws at which importance sampling stops; as many as a decision needs when left out. If all its
         rounds leave fewer, as many as a decision needs are enough.
 
     Returns
@@ -73,7 +73,7 @@ def _weighted(
         drawn_from = log_sum(by_proposal)
         log_weight = height - drawn_from
         if _are_enough(log_weight, wanted):
-            break
+            return z[truncated_rows(log_weight, n, rng)]
         points = WeightedPoints.weighted(z, _HOT * height - drawn_from)
         points = points.thinned(_LEARNED, rng)
         try:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from wirebayes.io.run_folder import read_json, stored_results, write_json
 from wirebayes.json_files.mixture import Member, MixtureJson
+from wirebayes.results.read_back import Stored, load_posterior
 
 FILE = "mixture.json"
 
@@ -43,3 +44,21 @@ def members_of(folder: Path) -> list[tuple[float, Path]]:
     with stored_results(path):
         first, *others = content["members"]
         return [(float(model["probability"]), folder / model["folder"]) for model in (first, *others)]
+
+
+def load_models(
+    folder: Path, experiment: str | None = None, own_effects: Path | None = None
+) -> list[tuple[float, Stored]]:
+    """The posterior of every model that a posterior stands for, with its probability.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the final posterior.
+    experiment, own_effects
+        As for `wirebayes.results.read_back.load_posterior`.
+    """
+    models = []
+    for probability, place in members_of(folder):
+        models.append((probability, load_posterior(place, experiment, own_effects)))
+    return models

@@ -14,8 +14,8 @@ def wires_known(wires: WiresUsed) -> str:
     model = "the plain model"
     effects = [spoken(effect) for effect in wires["effects"]]
     if effects:
-        models = wires.get("undecided", {})
-        model += f" with {listed(effects)}" if not models else f" with some of {listed(effects)}"
+        differ = any(len(models) > 1 for models in wires.get("undecided", {}).values())
+        model += f" with some of {listed(effects)}" if differ else f" with {listed(effects)}"
     draws = counted(wires["draws"], "posterior draw")
     length_mm = wires["tested_length_mm"]
     known = f"Wires known from {draws} of a sample of {length_mm:g} mm: {model}."
