@@ -5,7 +5,8 @@ from pathlib import Path
 
 from wirebayes.io.run_folder import read_json, stored_results, write_json
 from wirebayes.json_files.mixture import Member, MixtureJson
-from wirebayes.results.read_back import Stored, load_posterior
+from wirebayes.results import read_back
+from wirebayes.results.read_back import Stored
 
 FILE = "mixture.json"
 
@@ -60,5 +61,5 @@ def load_models(
     """
     models = []
     for probability, place in members_of(folder):
-        models.append((probability, load_posterior(place, experiment, own_effects)))
+        models.append((probability, read_back.load_posterior(place, experiment, own_effects)))
     return models
