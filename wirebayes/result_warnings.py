@@ -63,7 +63,7 @@ KINDS = {
     "few-holds": Kind("There are fewer than three holds: no effect can be established.", True),
     "hold-ends": Kind(
         "It is not known when holds ended, or a rest may have been counted as part of a hold, and this matters: a "
-        "parameter would change by more than its standard deviation.",
+        "parameter would change by more than its standard deviation, and by enough to count.",
         False,
     ),
     "extrapolation": Kind(

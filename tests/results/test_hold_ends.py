@@ -48,13 +48,14 @@ def test_the_shift_is_the_distance_to_the_fit_that_knows_the_ends(key, truth):
     early = hold_ends._early(unknown)
     before, after = unknown.in_units(unknown.own_units).theta_in(early, np.array([before, after]))
     spread = unknown.theta_in(early, draws).std(axis=0, ddof=1)
-    assert list(told["moved"]) == ["k2", *truth]
+    assert list(told["moved"]) == ["k1", "k2", *truth]
     for name, move in told["moved"].items():
         i = unknown.names.index(name)
         shift = after[i] - before[i]
-        unit = 1.0 if name == "k2" else early.length_mm
+        unit = {"k1": early.tension_N, "k2": 1.0}.get(name, early.length_mm)
         assert move["shift"] == pytest.approx(shift * unit, rel=0.02)  # priors follow the holds
         assert move["sd_share"] == pytest.approx(abs(shift) / spread[i], rel=0.02)
+        assert move["relative"] == (None if name in truth else pytest.approx(abs(shift) / before[i], rel=0.02))
     assert told["moved"]["k2"]["quantity"] == "k2 t^N after 0.9 s"
 
 
@@ -96,15 +97,18 @@ def test_the_last_hold_of_a_test_may_end_with_its_last_reading():
 )
 def test_a_small_shift_is_said_to_be_small(share, words):
     assert words in hold_ends.hold_ends_sentence(
-        {"k2": {"quantity": "k2", "shift": -0.003, "sd_share": share, "unit": "s^-N"}}
+        {"k2": {"quantity": "k2", "shift": -0.003, "sd_share": share, "relative": 0.1, "unit": "s^-N"}}
     )
 
 
-@pytest.mark.parametrize(("share", "warned"), [(0.99, False), (1.01, True)])
-def test_a_shift_of_a_standard_deviation_is_warned_of(share, warned):
+@pytest.mark.parametrize(
+    ("share", "relative", "warned"),
+    [(0.99, 0.1, False), (1.01, 0.1, True), (9.0, 0.019, False), (9.0, 0.021, True), (1.01, None, True)],
+)
+def test_a_shift_of_a_standard_deviation_that_is_large_enough_to_count_is_warned_of(share, relative, warned):
     told = {
         "covered": 0.9,
-        "moved": {"k2": {"quantity": "k2", "shift": 0.1, "sd_share": share, "unit": "s^-N"}},
+        "moved": {"k1": {"quantity": "k1", "shift": 0.1, "sd_share": share, "relative": relative, "unit": "N"}},
         "sentence": "as it is",
     }
     assert hold_ends.hold_ends_notice(told) == [Notice("hold-ends", "as it is")] * warned
@@ -129,7 +133,8 @@ def test_a_long_rest_is_a_part_of_its_hold_only_where_it_stayed_as_set():
     (warning,) = checked["warnings"]
     assert warning["kind"] == "hold-ends"
     assert "8, 9 and 10 (up to 20 min) went on long after the last reading" in warning["text"]
-    assert "had nothing followed that reading, k2 t^N after 12.9 s would be higher by" in warning["text"]
+    assert "had nothing followed that reading, k1 would be" in warning["text"]
+    assert "k2 t^N after 12.9 s would be higher by" in warning["text"]
     assert wb.check(with_rests(until_s=130.0)).summary()["warnings"] == []
 
 

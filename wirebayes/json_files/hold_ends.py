@@ -6,6 +6,8 @@ from typing import TypedDict
 class MovedByHoldEnds(TypedDict):
     """How far the best value of a quantity moves; `sd_share` in standard deviations of its posterior.
 
+    `relative` is the size of the shift as a share of that value: null for an amplitude, which may be zero.
+
     `quantity` is the parameter itself, but for k2, whose value depends on the unit of time: there it is k2 t^N after a
     hundredth of a typical hold.
     """
@@ -13,6 +15,7 @@ class MovedByHoldEnds(TypedDict):
     quantity: str
     shift: float
     sd_share: float
+    relative: float | None
     unit: str
 
 
