@@ -6,6 +6,8 @@ from typing import Any
 
 # of the draws that are wanted of a posterior by itself: of a 5 % tail a thousand effective ones leave 4 to 6 %
 _LEAST_SHARE = 0.25
+# of the steps: one that mixes poorly would else take most of the time for little of the answer
+_LEAST_STEPS = 0.1
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,9 @@ class Policy:
             raise ValueError(f"walkers: {self.walkers} given, an even number is needed")
 
     def of_share(self, share: float) -> "Policy":
-        """The same for a posterior that gives a share of the draws of an answer: no more are wanted, down to a quarter.
+        """The same for a posterior that gives a share of the draws of an answer.
+
+        No more than this share of the draws is wanted, down to a quarter, nor of the steps taken, down to a tenth.
 
         Parameters
         ----------
@@ -67,7 +71,8 @@ class Policy:
             From 0 to 1.
         """
         wanted = max(share, _LEAST_SHARE)
-        return replace(self, ess=wanted * self.ess, block=ceil(wanted * self.block))
+        most_steps = ceil(max(share, _LEAST_STEPS) * self.most_steps)
+        return replace(self, ess=wanted * self.ess, block=ceil(wanted * self.block), most_steps=most_steps)
 
 
 DEFAULT = Policy()
