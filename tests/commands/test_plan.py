@@ -313,3 +313,24 @@ def test_a_guess_of_numbers_alone_is_one(tmp_path):
     (row,) = wb.plan(path, tests=10, output=tmp_path / "out").summary()["protocols"]
     k1 = row["parameters"]["k1"]
     assert k1["guess_sd"] < 1e-9 < k1["sd"]
+
+
+def test_a_fits_folder_is_planned_with_the_priors_and_the_laws_of_that_fit(measured, tmp_path):
+    stated = replace(measured, priors={"N": {"fixed": 0.7}, "preload": {"fixed": 0.5}})
+    options = {"check": False, "policy": FEW, "elastic_law": "modified"}
+    wb.fit(stated, **options, output=tmp_path / "fit")
+    for folder in (tmp_path / "fit", tmp_path / "fit" / stated.name):
+        planned = wb.plan(folder, tests=4)
+        assert {"N", "preload"}.isdisjoint(planned.best["parameters"])  # known, so the later fit does not estimate them
+        assert all(one["kind"] != "left-out" for one in planned.summary()["warnings"])
+    wb.plan(tmp_path / "fit", tests=4, output=tmp_path / "plan")
+    assert read_json(tmp_path / "plan" / "configuration.json")["elastic_law"] == "modified"
+    with pytest.raises(wb.InputError, match="--history: found additive, expected saturating"):
+        wb.plan(tmp_path / "fit", tests=4, history="additive")
+
+
+def test_effects_of_a_fit_that_a_plan_leaves_out_are_said(measured, tmp_path):
+    wb.fit(measured, effects=["toe"], check=False, policy=FEW, output=tmp_path / "fit")
+    planned = wb.plan(tmp_path / "fit", tests=4)
+    (notice,) = (one for one in planned.summary()["warnings"] if one["kind"] == "left-out")
+    assert notice["text"].startswith("wire was fitted with toe: the plan simulates and fits without")

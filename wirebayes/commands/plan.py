@@ -22,11 +22,11 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments, select
 from wirebayes.io.plan_file import PlanFile, PlannedTest, is_plan, read_plan
 from wirebayes.io.readings import Hold
-from wirebayes.io.run_folder import open_run, read_json, write_json
+from wirebayes.io.run_folder import CONFIGURATION, open_run, read_json, write_json
 from wirebayes.json_files.discovery import DiscoveryJson
 from wirebayes.json_files.plain import plain
 from wirebayes.model.sample import Sample
-from wirebayes.model.spec import ModelSpec
+from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.numeric.frozen import frozen
 from wirebayes.planning.guess import GuessedWire, from_posterior, from_readings, from_tables
 from wirebayes.planning.ranking import Judged, ranked
@@ -34,7 +34,9 @@ from wirebayes.planning.sensitivity import sensitivity
 from wirebayes.planning.widths import at_centre, expected_widths, middle_tension
 from wirebayes.processes.workers import computing
 from wirebayes.progress import Progress, silent
+from wirebayes.result_warnings import Notice
 from wirebayes.results import read_back
+from wirebayes.sentences import spoken
 from wirebayes.simulation.synthetic import Bench
 from wirebayes.strict.files import PathLike
 from wirebayes.views.plan import Plan
@@ -84,7 +86,7 @@ def plan(
     tests : int
         Simulated tests of each protocol.
     elastic_law, history
-        Of the plain model, as in `fit`.
+        Of the plain model, as in `fit`; where the guess is a posterior, those of its fit.
     own_effects : path, optional
         A Python file with effects of your own.
     seed : int
@@ -119,6 +121,7 @@ def plan(
     kinds = catalogue(own)
     rng = np.random.default_rng(seed_of(seed, "guess"))
     request = _request(source, experiment, tests, kinds, spec, own, rng)
+    spec = request.spec
     if aim is not None:
         request = replace(request, aim=_checked_aim(aim, list(kinds)))
     if budget_min is not None:
@@ -130,8 +133,8 @@ def plan(
         "command": "plan",
         "version": __version__,
         "seed": seed,
-        "elastic_law": elastic_law,
-        "history": history,
+        "elastic_law": spec.law,
+        "history": spec.history,
         "own_effects": source_of(own),
         "tests": tests,
         "aim": list(request.aim),
@@ -210,10 +213,10 @@ def _request(
         raise InputError(f"source: found {type(source).__name__}, expected a path or an Experiment")
     path = Path(source)
     if path.is_dir():
-        return _of_folder(path, name, n, kinds, own)
+        return _of_folder(path, name, n, kinds, spec, own)
     if is_plan(path):
         written = read_plan(path, list(kinds))
-        return _of_plan(written, name, n, kinds, own, rng)
+        return _of_plan(written, name, n, kinds, spec, own, rng)
     read = read_experiments(path)
     first, *others = select(read, name)
     if others:
@@ -227,10 +230,12 @@ def _of_experiment(measured: Experiment, n: int, kinds: Kinds, spec: ModelSpec, 
     check_priors([measured], kinds, spec=spec)
     guess = from_readings(measured, n, rng, spec)
     about = {"data_sha256": measured.data_hash, "priors": measured.priors}
-    return PlanRequest(_like(measured), guess, ("parameters",), None, None, about)
+    return PlanRequest(_like(measured), guess, ("parameters",), None, None, about, spec)
 
 
-def _of_plan(file: PlanFile, name: str | None, n: int, kinds: Kinds, own: Path | None, rng: Generator) -> PlanRequest:
+def _of_plan(
+    file: PlanFile, name: str | None, n: int, kinds: Kinds, spec: ModelSpec, own: Path | None, rng: Generator
+) -> PlanRequest:
     planned = [_experiment(test, file) for test in file.tests]
     for test in planned:
         check_priors([test], kinds)
@@ -238,22 +243,51 @@ def _of_plan(file: PlanFile, name: str | None, n: int, kinds: Kinds, own: Path |
     if file.posterior is None:
         guess = from_tables(file.guess, file.guess_lines, file.source, planned, n, rng)
     else:
-        earlier, about, _ = _posterior(file.posterior, name, n, own)
+        earlier, sample, _ = _posterior(file.posterior, name, n, own)
+        about["posterior"] = hash_of(earlier.draws)
+        spec = _spec_of_fit(sample, spec, file.posterior)
         guess = earlier.on_benches_of(planned, rng)
     about["guess"] = file.guess
     about["priors"] = file.priors
     about["material"] = file.material
     about["protocols"] = [vars(test) for test in file.tests]
     tests = [(test, "") for test in planned]
-    return PlanRequest(tests, guess, file.aim, file.budget_min, file.robot, about)
+    return PlanRequest(tests, guess, file.aim, file.budget_min, file.robot, about, spec)
 
 
-def _of_folder(folder: Path, name: str | None, n: int, kinds: Kinds, own: Path | None) -> PlanRequest:
-    """The folder of a fit or discover: the same test again, and others like it."""
-    guess, about, sample = _posterior(folder, name, n, own)
+def _of_folder(folder: Path, name: str | None, n: int, kinds: Kinds, spec: ModelSpec, own: Path | None) -> PlanRequest:
+    """The folder of a fit or discover: the same test again, and others like it, with the priors of that fit."""
+    guess, sample, place = _posterior(folder, name, n, own)
+    spec = _spec_of_fit(sample, spec, folder)
+    measured = replace(_measured(sample, folder), priors=_priors_of_fit(place, sample.name))
+    about = {"posterior": hash_of(guess.draws), "priors": measured.priors}
     rivals = [effect for effect in _rivals(folder / "discovery.json", sample.name) if effect in kinds]
     aim = tuple(rivals[:2]) if len(rivals) > 1 else ("parameters",)
-    return PlanRequest(_like(_measured(sample, folder)), guess, aim, None, None, about)
+    return PlanRequest(_like(measured), guess, aim, None, None, about, spec)
+
+
+def _spec_of_fit(sample: Sample, asked: ModelSpec, folder: Path) -> ModelSpec:
+    """The plain model of an earlier fit, which its draws belong to; an `InputError` where another was asked for."""
+    model = sample.model
+    options = (
+        ("--elastic-law", asked.law, PLAIN_SPEC.law, model.law),
+        ("--history", asked.history, PLAIN_SPEC.history, model.history),
+    )
+    for option, wanted, left_out, fitted in options:
+        if wanted not in (left_out, fitted):
+            raise InputError(f"{option}: found {wanted}, expected {fitted}, with which {folder} was fitted")
+    return replace(asked, law=model.law, history=model.history)
+
+
+def _priors_of_fit(place: Path, name: str) -> dict[str, dict[str, Any]]:
+    """What was stated before a fit whose posterior lies here: its configuration is there or just above."""
+    here = place.absolute()
+    for folder in (here, *list(here.parents)[:2]):
+        file = folder / CONFIGURATION
+        if file.is_file():
+            priors: dict[str, dict[str, dict[str, Any]]] = read_json(file).get("priors", {})
+            return priors.get(name, {})
+    return {}
 
 
 def _rivals(findings: Path, name: str) -> list[str]:
@@ -267,7 +301,8 @@ def _rivals(findings: Path, name: str) -> list[str]:
     return list(dict.fromkeys([*found["set"], *found["group"]]))
 
 
-def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tuple[GuessedWire, dict[str, Any], Sample]:
+def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tuple[GuessedWire, Sample, Path]:
+    """The guess by a fit, what was fitted, and where the posterior lies."""
     discovered = any(folder.glob("**/plain/posterior.nc"))
     model = "plain" if discovered else None
     which, place = find_posterior(folder, name, model)
@@ -279,9 +314,21 @@ def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tupl
     length_mm = sample.protocol.length_mm
     source = f"the posterior of {sample.name} in {folder.name}"
     guess = from_posterior(stored.draws, length_mm, source, n)
-    guess = replace(guess, doubts=stored.doubts, control=sample.protocol.control)
-    about = {"posterior": hash_of(guess.draws)}
-    return guess, about, sample
+    doubts = (*stored.doubts, *_left_out(sample))
+    guess = replace(guess, doubts=doubts, control=sample.protocol.control)
+    return guess, sample, place
+
+
+def _left_out(sample: Sample) -> list[Notice]:
+    """That tests are planned without the effects of the fit, if it has any."""
+    if not sample.model.effects:
+        return []
+    effects = ", ".join(spoken(effect.name) for effect in sample.model.effects)
+    text = (
+        f"{sample.name} was fitted with {effects}: the plan simulates and fits without, and a fit of the whole model "
+        "may know the parameters several times less well than is said"
+    )
+    return [Notice("left-out", text)]
 
 
 def _experiment(test: PlannedTest, file: PlanFile) -> Experiment:

@@ -38,6 +38,7 @@ class PlanRequest:
     budget_min: float | None
     robot: RobotLike | None
     about: dict[str, Any]
+    spec: ModelSpec
 
 
 def protocol_content(
