@@ -195,6 +195,16 @@ def test_a_calibration_goes_by_the_most_probable_model(folder: Path, tmp_path: P
     assert any("only the most probable is used here: strain stiffening, 70 %" in text for text in said)
 
 
+def test_specimens_go_by_their_most_probable_models(folder: Path, tmp_path: Path) -> None:
+    plain = folder / "undecided" / "1"
+    of_two = tmp_path / "of-two"
+    shutil.copytree(plain, of_two)
+    write_mixture(of_two, [(".", 0.6, []), ("undecided/1", 0.4, ["strain_stiffening"])])
+    line = draws_of([plain, of_two], 10)
+    said = [notice.text for notice in line.doubts if notice.kind == "left-out"]
+    assert said == [f"{of_two}: of the models that the test leaves undecided only the most probable is used here, 60 %"]
+
+
 def test_a_history_goes_on_with_the_wires_that_were_calibrated(monkeypatch: pytest.MonkeyPatch) -> None:
     line = models_together(models())
     kept: list[WireDraws] = []

@@ -1,6 +1,6 @@
 """Draws of a fitted line in the form that the robot takes: of a posterior, of models undecided, of specimens."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,8 +11,9 @@ from wirebayes.inference.between_specimens import between_specimens
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.means import geometric_mean
 from wirebayes.numeric.typing import Floats
+from wirebayes.result_warnings import Notice
 from wirebayes.results import read_back
-from wirebayes.results.mixture import load_models
+from wirebayes.results.mixture import load_models, members_of
 from wirebayes.results.read_back import Stored
 from wirebayes.robot.mechanics.draws import CORE, LENGTH_EXPONENT, WireDraws, material
 from wirebayes.robot.mechanics.undecided_models import draws_of_each, models_together, that_go_together
@@ -158,8 +159,18 @@ def draws_of_specimens(
         time_range_s=_widest([one.time_range_s for one in each]),
         spread=dict(zip(CORE, found.spread.T, strict=True)),
         specimens=len(each),
-        doubts=tuple(doubt for one in each for doubt in one.doubts),
+        doubts=tuple(_doubts_of_specimens(folders, each)),
     )
+
+
+def _doubts_of_specimens(folders: Sequence[Path], each: Sequence[WireDraws]) -> Iterator[Notice]:
+    """What is to be said of the specimens' tests, and that of undecided models only the most probable counts."""
+    for folder, one in zip(folders, each, strict=True):
+        yield from one.doubts
+        most_probable, *others = members_of(folder)
+        if others:
+            text = f"{folder}: of the models that the test leaves undecided only the most probable is used here"
+            yield Notice("left-out", f"{text}, {100 * most_probable[0]:.0f} %")
 
 
 def _at_typical(logarithms: Floats, typical: Typical, *, back: bool = False) -> Floats:
