@@ -16,7 +16,7 @@ from wirebayes.cli import main
 from wirebayes.commands import pose_history
 from wirebayes.commands.asked_pose import AskedPose
 from wirebayes.commands.predict import find_posterior
-from wirebayes.commands.wires import draws_of, posterior_of
+from wirebayes.commands.wires import content_hash, content_of, draws_of
 from wirebayes.effects import catalogue, effect_named
 from wirebayes.effects.creep import SteadyCreep, SteadyCreepCarried
 from wirebayes.errors import InputError
@@ -224,12 +224,12 @@ def test_a_history_goes_on_with_the_wires_that_were_calibrated(monkeypatch: pyte
 
 
 def test_another_probability_is_another_configuration(folder: Path) -> None:
-    before = posterior_of(folder, None)
-    assert before == posterior_of(folder, None)
+    before = content_of(folder, None)
+    assert before == content_of(folder, None)
     write_mixture(folder, [(".", 0.6, ["strain_stiffening"]), ("undecided/1", 0.4, [])])
-    assert posterior_of(folder, None) != before
+    assert content_of(folder, None) != before
     write_mixture(folder, [(".", 0.7, ["strain_stiffening"]), ("undecided/1", 0.3, [])])
-    assert posterior_of(folder / "undecided" / "1", None) == folder / "undecided" / "1" / "posterior.nc"
+    assert content_of(folder / "undecided" / "1", None) == content_hash(folder / "undecided" / "1" / "posterior.nc")
 
 
 @pytest.mark.parametrize(

@@ -13,9 +13,9 @@ from wirebayes.commands.wires import (
     Wires,
     configuration,
     content_hash,
+    content_of,
     draws_for,
     hash_of,
-    posterior_of,
     robot_of,
 )
 from wirebayes.errors import InputError
@@ -155,7 +155,7 @@ def calibrate(
     options |= given.of_geometry()
     options["--next-poses"] = next_poses
     place = ResultFolder.at(output)
-    decides = configuration("calibrate", robot, posterior_of(wires, experiment), draws, seed, own, options)
+    decides = configuration("calibrate", robot, content_of(wires, experiment), draws, seed, own, options)
     with open_run(place.path, decides) as run:
         if run.state != "done":
             spread = typical_spread(line, specimen_spread)
@@ -392,6 +392,5 @@ def _check_usable(folder: Path, name: str) -> None:
 
 def _belongs_to(robot: Robot, wires: Wires | None, experiment: str | None) -> BelongsTo:
     """What tells a robot and the posterior of its wires from others."""
-    posterior = posterior_of(wires, experiment)
-    kept = posterior if isinstance(posterior, str) else content_hash(posterior)
+    kept = content_of(wires, experiment)
     return {"robot": hash_of(asdict(robot)), "wires": kept}

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from wirebayes.commands.options import Numbers, check_seed, numbers, path_of, rising_times, text_of
-from wirebayes.commands.wires import RobotLike, Wires, configuration, draws_for, posterior_of, robot_of
+from wirebayes.commands.wires import RobotLike, Wires, configuration, content_of, draws_for, robot_of
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
 from wirebayes.json_files.export import ExportSummary
@@ -94,8 +94,8 @@ def export(
     }
     place = ResultFolder.at(output)
     options = {"--experiment": experiment, "--tensions": text_of(tensions), "--times": text_of(times)}
-    posterior = posterior_of(wires, experiment)
-    decides = configuration("export", robot, posterior, draws, seed, own, options)
+    content = content_of(wires, experiment)
+    decides = configuration("export", robot, content, draws, seed, own, options)
     with open_run(place.path, decides) as run:
         if run.state != "done":
             folder = run.directory

@@ -26,7 +26,6 @@ from wirebayes.commands.wires import (
     configuration,
     content_of,
     draws_for,
-    posterior_of,
     robot_of,
 )
 from wirebayes.errors import InputError
@@ -248,9 +247,9 @@ class _Given:
 
     def begun(self, options: Mapping[str, Any]) -> Begun:
         """Where results go, and what decides them."""
-        posterior = posterior_of(self.wires, self.experiment)
+        content = content_of(self.wires, self.experiment)
         every = {"--experiment": self.experiment, **options}
-        decides = configuration("pose", self.robot, posterior, self.draws, self.seed, self.own_effects, every)
+        decides = configuration("pose", self.robot, content, self.draws, self.seed, self.own_effects, every)
         return Begun(decides, ResultFolder.at(self.output), self.progress)
 
 

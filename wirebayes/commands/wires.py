@@ -63,24 +63,16 @@ def robot_of(robot: RobotLike) -> Robot:
     return at_home(robot if isinstance(robot, Robot) else read_robot(robot))
 
 
-def posterior_of(wires: Wires | None, experiment: str | None) -> Path | str:
-    """The posterior that decides a result; of several lines, what tells them all; empty where there is none."""
-    if wires is None:
-        return ""
-    if _several(wires) or _is_sample(wires):
-        return content_of(wires, experiment)
-    folder = folder_of(wires, experiment)
-    return _content_of_models(folder) if len(members_of(folder)) > 1 else folder / POSTERIOR
-
-
-def content_of(wires: Wires, experiment: str | None) -> str:
-    """What tells the posteriors of wires from others.
+def content_of(wires: Wires | None, experiment: str | None) -> str:
+    """What tells the posteriors of wires from others; empty where the robot's file gives the wires.
 
     Parameters
     ----------
-    wires : line, several specimens of it, or mapping of wire name to one of them
+    wires : line, several specimens of it, mapping of wire name to one of them, or None
     experiment : str or None
     """
+    if wires is None:
+        return ""
     if _several(wires):
         return hash_of({name: content_of(line, experiment) for name, line in wires.items()})
     if not _is_sample(wires):
@@ -250,7 +242,7 @@ def _folders(text: str) -> Path | list[Path]:
 def configuration(
     command: str,
     robot: RobotLike,
-    posterior: Path | str,
+    content: str,
     draws: int,
     seed: int,
     own_effects: Path | None,
@@ -262,8 +254,8 @@ def configuration(
     ----------
     command : str
     robot : Robot or path
-    posterior : Path
-        The file of the wires' draws.
+    content : str
+        Of the wires' posteriors, as `content_of` tells them from others.
     draws, seed : int
     own_effects : Path or None
     options : mapping of name to value
@@ -278,7 +270,7 @@ def configuration(
         "command": command,
         "version": __version__,
         "robot": identity_of(robot),
-        "wires": posterior if isinstance(posterior, str) else content_hash(posterior),
+        "wires": content,
         "own_effects": source_of(own_effects),
         "draws": draws,
         "seed": seed,
