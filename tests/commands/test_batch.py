@@ -239,6 +239,17 @@ def test_a_discovered_experiment_has_both_posteriors_and_a_verdict(tests, tmp_pa
     assert row["verdict"].replace("-", " ") in wb.write_report(many).read_text()
 
 
+def test_parameters_of_a_plain_model_that_lacks_something_are_said_to_be_such(tmp_path, here):
+    options = {"displacements": range(1, 9), "times": [0, 30, 60], "seed": 1, "parameters": TRUTH}
+    (test,) = wb.simulate_tests(**options, effects={"toe.w": 2.0}).experiments
+    many = wb.batch(test, policy=FEW, simulations=99, without=_all_but("toe"), output=tmp_path / "out")
+    (row,) = rows_of(tmp_path / "out")
+    assert row["verdict"] == "named"
+    assert "lacks what was found missing (p" in row["warnings"]
+    assert f"{test.name}/final/summary.json" in row["warnings"]
+    assert (many.folder / test.name / "final" / "summary.json").is_file()
+
+
 def _all_but(*names):
     return [effect.name for effect in wb.list_effects() if effect.name not in names]
 

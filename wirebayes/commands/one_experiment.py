@@ -22,14 +22,17 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.next_hold import write_next_hold
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.batch import AtTypical, DiscoveryColumns, FitColumns, Row
+from wirebayes.json_files.discovery import ExperimentFindings
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.json_files.values import Quantiles, Statistics
 from wirebayes.model.spec import ModelSpec
 from wirebayes.numeric.typing import Array
 from wirebayes.processes.workers import one_thread_each
 from wirebayes.progress import silent
+from wirebayes.result_warnings import Notice, to_json
 from wirebayes.results.contraction import interval
 from wirebayes.results.jobs import Job, fit_job, store
+from wirebayes.sentences import p_in_words
 from wirebayes.views.posterior import POSTERIOR, SUMMARY
 
 QUANTITIES = ("mean", "sd", "q05", "q50", "q95")
@@ -195,8 +198,20 @@ def _discovered(experiment: Experiment, task: BatchTask, folder: Path) -> Discov
         "verdict": report["verdict"],
         "effects": report["effects"],
         "best_effect": report["best"],
-        "warnings": report["warnings"],
+        "warnings": [*report["warnings"], *to_json(_on_the_plain_model(report, experiment.name))],
     }
+
+
+def _on_the_plain_model(report: ExperimentFindings, name: str) -> list[Notice]:
+    """That a row's parameters lack what was found missing, if anything was."""
+    if report["verdict"] == "nothing-missing":
+        return []
+    sure = p_in_words(report["p_global"], report["p_simulations"])
+    text = (
+        f"the parameters in the table are those of the plain model, which lacks what was found missing ({sure}): they "
+        f"can be wrong by more than is said; those of the final model are in {name}/final/{SUMMARY}"
+    )
+    return [Notice("model-check", text)]
 
 
 def _columns(summary: SummaryJson, fit: Fit, p: float | None, passed: bool | None) -> FitColumns:
