@@ -40,6 +40,7 @@ from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.readings import protocol_table
 from wirebayes.io.run_folder import write_csv
 from wirebayes.json_files.summary import CREEP_TIMES_S
+from wirebayes.prediction.mixture import drawn_readings
 from wirebayes.prediction.request import request_of
 from wirebayes.prediction.table import mixture_table
 from wirebayes.results.jobs import Job, one
@@ -187,7 +188,7 @@ def figures(stored: Stored, simulated: Simulated, folder: Path) -> list[dict[str
     add("derived", "stiffness_N", float(value[0]), *map(float, np.quantile(stiff, [0.05, 0.95])))
 
     request = request_of(protocol_table(folder / "later.csv"), stored)
-    rows = mixture_table([(1.0, request)])
+    rows = mixture_table(drawn_readings([(1.0, request)]), request)
     measured = truth.readings[-LATER:, :, 0][truth.protocol.mask[-LATER:]]
     for row, reading in zip(rows, measured, strict=True):
         add("predict", f"hold {row[1]}", float(reading), row[6], row[8])

@@ -10,15 +10,22 @@ from scipy import stats
 from tests.model.dense import normal
 from tests.simulated import simulated_tests
 from wirebayes.model.build import build
-from wirebayes.prediction import table as module
+from wirebayes.prediction import mixture as module
+from wirebayes.prediction.mixture import drawn_readings
 from wirebayes.prediction.predictive import PredictionRequest
-from wirebayes.prediction.table import beyond_tested, dataset, header, mixture_table
+from wirebayes.prediction.table import beyond_tested, dataset, header, mixture_table, without_readings
 from wirebayes.results.read_back import Stored
 from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.wire.model import Model
 
 WIRE = {"k1": 900.0, "B": 0.25, "U": 0.6, "k2": 0.05, "N": 0.7, "preload": 0.4, "sensor_sd": 0.01, "setting_sd": 0.01}
 DRAWS = 40000
+
+
+def table_of(members: Any, seed: int = 0, draws: int = 4000) -> list[list[Any]]:
+    """The rows of a protocol requested of one or several models."""
+    _, request = members[0]
+    return mixture_table(drawn_readings(members, seed, draws), request)
 
 
 def test_rows_as_a_dataset_have_names_and_units() -> None:
@@ -72,7 +79,7 @@ def test_quantiles_are_those_of_the_known_normal() -> None:
     every = np.ones(3, bool)
     question = PredictionRequest(protocol, 0, every, np.full(3, np.nan))  # the same holds of a fresh sample
     request = SimpleNamespace(stored=stored, prediction=question, holds=experiment.holds)
-    rows = [dict(zip(header("displacement"), row, strict=True)) for row in mixture_table([(1.0, request)], draws=DRAWS)]  # type: ignore[arg-type]
+    rows = [dict(zip(header("displacement"), row, strict=True)) for row in table_of([(1.0, request)], draws=DRAWS)]
     r, covariance, hold = normal(protocol, WIRE, Model(), experiment.tension(), 0.02)
     mean, sd = experiment.tension()[protocol.mask] - r, np.sqrt(np.diag(covariance))
     assert [row["hold"] for row in rows] == list(hold + 1)
@@ -97,7 +104,7 @@ def test_undecided_models_answer_as_often_as_they_are_probable() -> None:
         members.append((share, SimpleNamespace(stored=stored, prediction=question, holds=experiment.holds)))
         r, covariance, _ = normal(protocol, wire, Model(), experiment.tension(), 0.02)
         parts.append((share, experiment.tension()[protocol.mask] - r, np.sqrt(np.diag(covariance))))
-    rows = [dict(zip(header("displacement"), row, strict=True)) for row in mixture_table(members, draws=DRAWS)]  # type: ignore[arg-type]
+    rows = [dict(zip(header("displacement"), row, strict=True)) for row in table_of(members, draws=DRAWS)]
     for i, row in enumerate(rows):
         assert row["mean_N"] == pytest.approx(sum(share * mean[i] for share, mean, _ in parts), abs=0.01)
         for name, level in (("q05_N", 0.05), ("q95_N", 0.95)):
@@ -118,7 +125,7 @@ def mixed(
             {name: np.full(stored_draws, value) for name, value in (WIRE | {"k1": k1}).items()}, sample, "chain"
         )
         members.append((share, SimpleNamespace(stored=stored, prediction=question, holds=experiment.holds)))
-    return [dict(zip(header("displacement"), row, strict=True)) for row in mixture_table(members, draws=8000)]  # type: ignore[arg-type]
+    return [dict(zip(header("displacement"), row, strict=True)) for row in table_of(members, draws=8000)]
 
 
 @pytest.mark.parametrize("number", [1, 2])
@@ -181,10 +188,10 @@ def test_four_thousand_draws_are_shared_by_probability_and_an_improbable_model_h
         return np.zeros((*protocol.time_s.shape, len(theta)))
 
     monkeypatch.setattr(module, "draw_unconditioned", predict)
-    mixture_table([(share, request) for share in shares])  # type: ignore[misc]
+    table_of([(share, request) for share in shares])
     assert [len(rows) for rows in asked] == used
-    mixture_table([(1.0, request)])  # type: ignore[arg-type]
-    mixture_table([(1.0, request)], 0, 70)  # type: ignore[arg-type]
+    table_of([(1.0, request)])
+    table_of([(1.0, request)], 0, 70)
     assert [len(rows) for rows in asked[-2:]] == [4000, 70]
     del asked[-2:]
     for rows in asked:
@@ -207,7 +214,7 @@ def test_figures_are_those_of_the_draws_to_the_last_bit_where_a_reading_is_given
     drawn = np.random.default_rng(0).normal(size=(3, 3, 9))
     drawn[1, 0] = 0.1  # the sum of nine is not nine times as much
     monkeypatch.setattr(module, "draw_unconditioned", lambda *given: drawn)
-    rows = mixture_table([(1.0, request)])  # type: ignore[arg-type]
+    rows = table_of([(1.0, request)])
     where = [(1, 0), (1, 1), (2, 0), (2, 1), (2, 2)]
     assert [row[:4] for row in rows] == [
         ["wire", 2, 2.0, 0.0],
@@ -227,10 +234,9 @@ def test_a_prediction_has_a_seed_of_its_own_and_zero_where_none_is_given() -> No
     stored = Stored({name: np.full(9, value) for name, value in WIRE.items()}, sample, "chain")
     question = PredictionRequest(protocol, 0, np.ones(1, bool), np.full(1, np.nan))
     request = SimpleNamespace(stored=stored, prediction=question, holds=experiment.holds)
-    found = {seed: mixture_table([(1.0, request)], seed) for seed in (0, 1)}  # type: ignore[arg-type]
-    assert mixture_table([(1.0, request)]) == found[0] != found[1]  # type: ignore[arg-type]
-    mixed = [(1.0, request)]
-    assert mixture_table(mixed) == found[0]  # type: ignore[arg-type]
+    found = {seed: table_of([(1.0, request)], seed) for seed in (0, 1)}
+    without = mixture_table(drawn_readings([(1.0, request)]), request)  # type: ignore[arg-type, list-item]
+    assert without == found[0] != found[1]
 
 
 def test_a_prediction_draws_the_median_and_band_of_each_hold():
@@ -247,3 +253,48 @@ def test_a_prediction_under_weights_draws_displacements():
     axes = dataset([["w", 7, 4.0, 0.0, 3.0, 0.1, 2.8, 3.0, 3.2]], {}, "force").plot()
     assert axes.get_ylabel() == "displacement, mm"
     assert axes.get_lines()[0].get_label() == "hold 7, 4 N"
+
+
+def weighed(failing: int, of: int = 1000) -> tuple[dict[int, np.ndarray], Any]:
+    """Draws of two holds under weights, in the second of which some have no reading."""
+    holds = [SimpleNamespace(number=k, setting=5.0 * k, control="force", time_s=np.array([0.0, 60.0])) for k in (1, 2)]
+    drawn = np.random.default_rng(0).normal(size=(2, 2, of))
+    drawn[1, 1, :failing] = np.nan
+    prediction = SimpleNamespace(requested=np.ones(2, bool))
+    stored = SimpleNamespace(sample=SimpleNamespace(name="wire"))
+    return {0: drawn[0], 1: drawn[1]}, SimpleNamespace(holds=holds, prediction=prediction, stored=stored)
+
+
+@pytest.mark.parametrize(("failing", "empty"), [(0, False), (1, False), (500, False), (501, True), (1000, True)])
+def test_draws_without_a_reading_do_not_count_and_are_told(failing: int, empty: bool) -> None:
+    drawn, request = weighed(failing)
+    rows = mixture_table(drawn, request)
+    for row, values in zip(rows[:2], drawn[0], strict=True):
+        assert row[4] == pytest.approx(values.mean(), abs=1e-12)
+    for row, values in zip(rows[2:], drawn[1][:, failing:], strict=True):
+        assert np.isnan(row[4:]).all() if empty else row[4] == pytest.approx(values.mean(), abs=1e-12)
+        assert empty or row[6] == pytest.approx(np.quantile(values, 0.05), abs=1e-12)
+    said = without_readings(drawn, request)
+    assert [notice.kind for notice in said] == ["extrapolation"] * (failing > 0)
+    if said:
+        assert f"hold 2: in up to {failing / 10:.3g} % of the draws (hold 2, at 10 N)" in said[0].text
+        assert ("left empty" in said[0].text) == empty
+
+
+def test_a_wire_that_cannot_carry_what_was_read_is_no_draw_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A model all of whose draws fail has no part in the answer, and of another those that fail have none."""
+    experiment = simulated_tests([Bench(displacements_mm=(2, 4))], Truth(WIRE), seed=1)[0]
+    question = PredictionRequest(experiment.protocol(), 0, np.ones(2, bool), np.array([1.0, np.nan]))
+    sample = SimpleNamespace(name="wire")
+    stored = SimpleNamespace(theta=np.zeros((9, 1)), problem=None, likelihood="chain", sample=sample)
+    request: Any = SimpleNamespace(stored=stored, prediction=question, holds=experiment.holds)
+    good = np.random.default_rng(0).normal(size=(*experiment.protocol().time_s.shape, 400))
+    some = good.copy()
+    some[1, -1, :100] = np.nan
+    none = np.full_like(good, np.nan)
+    made = iter([none, some, good[..., 100:].copy()])
+    monkeypatch.setattr(module, "draw_unconditioned", lambda *given: next(made))
+    both = drawn_readings([(0.5, request), (0.5, request)])
+    alone = drawn_readings([(1.0, request)])
+    for j in (0, 1):
+        np.testing.assert_array_equal(both[j], alone[j])

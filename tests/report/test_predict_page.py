@@ -30,6 +30,14 @@ def test_the_answer_has_number_unit_and_band() -> None:
     assert in_a_sentence(dataset(rows(1)[:1], ABOUT)).count("after") == 1
 
 
+def test_a_hold_without_a_predicted_reading_is_said_to_have_none() -> None:
+    empty = [[*row[:4], *[float("nan")] * 5] for row in rows()]
+    assert in_a_sentence(dataset(empty, ABOUT, "force")) == (
+        "Hold 8 of kite, at 12 N, has no predicted reading: in most draws the wire cannot carry what is set; "
+        "1 more hold below."
+    )
+
+
 def test_under_weights_millimetres_are_read() -> None:
     said = in_a_sentence(dataset(rows(1), ABOUT, "force"))
     assert "at 12 N" in said and "5.00 mm (4.84 … 5.16)" in said

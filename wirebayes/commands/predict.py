@@ -11,6 +11,7 @@ from wirebayes.io.arrays import protocol_of_columns
 from wirebayes.io.readings import protocol_table
 from wirebayes.io.run_folder import check_file, write_csv
 from wirebayes.prediction.given_back import let_back
+from wirebayes.prediction.mixture import drawn_readings
 from wirebayes.prediction.request import ProtocolRequest, request_of
 from wirebayes.prediction.table import (
     Prediction,
@@ -19,6 +20,7 @@ from wirebayes.prediction.table import (
     header,
     mixture_table,
     unlikely_readings,
+    without_readings,
 )
 from wirebayes.result_warnings import Notice, to_json
 from wirebayes.results import read_back
@@ -102,11 +104,14 @@ def predict(
     file = path_of(output, "output")
     if file is not None:
         _check_output(file, protocol)
-    rows = mixture_table(requests, seed)
+    drawn = drawn_readings(requests, seed)
+    _, asked = requests[0]
+    rows = mixture_table(drawn, asked)
     if file is not None:
         write_csv(file, header(control), rows)
     doubts = [doubt for _, stored in members for doubt in stored.doubts]
     doubts += beyond_tested(rows, first)
+    doubts += without_readings(drawn, asked)
     doubts += let_back(rows, first, fresh=fresh)
     doubts += unlikely_readings(requests, seed)
     attributes = {"prediction": _sentence(requests), "seed": seed, **_warnings(doubts)}

@@ -1,8 +1,7 @@
 """Predicted readings as a table: one row for each row of the protocol file."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -10,18 +9,16 @@ import numpy as np
 import xarray as xr
 
 from wirebayes.errors import InputError
-from wirebayes.inference.fit import seed_of
 from wirebayes.io.readings import READ, SET, Hold
 from wirebayes.io.run_folder import read_json, writable, write_csv, write_json
 from wirebayes.json_files.prediction import PredictionJson
 from wirebayes.numeric.evenly import evenly
-from wirebayes.numeric.log_sum import log_sum
-from wirebayes.numeric.typing import Floats
-from wirebayes.prediction.predictive import draw_unconditioned, given_first, log_density_of_given
+from wirebayes.numeric.typing import Bools, Floats
+from wirebayes.prediction.mixture import Members, drawn_readings
 from wirebayes.prediction.request import ProtocolRequest
 from wirebayes.result_warnings import Notice
 from wirebayes.results.read_back import Stored
-from wirebayes.sentences import short
+from wirebayes.sentences import holds_in_words, short
 from wirebayes.strict.files import PathLike
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.protocol import Control
@@ -32,10 +29,8 @@ FAR_UP = 2.0  # times the largest tested tension: nothing there was tested
 # of time, or by a second and slow relaxation (113 of 120 passed their check), 90 % bands of rising holds and of rests
 # had 83 to 97 % of the readings at up to 3 times these holds, 65 to 95 % at 5 times, 20 to 87 % at 10 times.
 FAR_ON = 3.0
-_LEAST = 2  # draws of a model that hardly counts: one has no spread
 _FEW = 500  # draws, enough for a standard deviation
-Members = Sequence[tuple[float, ProtocolRequest]]  # of a mixture: probability and request, one or several
-DRAWS = 4000  # a 5 % quantile is then one between 4.3 % and 5.7 %
+_ANSWERED = 0.5  # of the draws: where most of them have no reading, the quantiles of the others say little
 
 
 def header(control: Control) -> tuple[str, ...]:
@@ -45,28 +40,64 @@ def header(control: Control) -> tuple[str, ...]:
     return ("experiment", "hold", SET[control], "time_s", *figures)
 
 
-def mixture_table(members: Members, seed: int = 0, draws: int = DRAWS) -> list[list[Any]]:
+def mixture_table(drawn: Mapping[int, Floats], request: ProtocolRequest) -> list[list[Any]]:
     """Mean, sd and quantiles of the requested readings, in the file's order.
 
     Parameters
     ----------
-    members : sequence of (probability, ProtocolRequest)
-        One protocol requested of each model, as often among a hold's draws as it is probable given the first readings
-        that condition the hold; the probabilities, which are those without them, sum to one.
-    draws : int
-        In all, evenly spread over the stored ones.
+    drawn : mapping of position to (R, n) array
+        Readings of each requested hold, by `wirebayes.prediction.mixture.drawn_readings`. A draw that has none, because
+        its wire cannot carry a weight, does not count; where most have none, the figures are NaN.
+    request : ProtocolRequest
     """
-    drawn = _drawn(members, seed, draws)
-    _, request = members[0]
     experiment = request.stored.sample.name
-    positions = np.flatnonzero(request.prediction.requested).tolist()
     rows: list[list[Any]] = []
-    for hold, position in zip(request.holds, positions, strict=True):
-        here = drawn[position][: len(hold.time_s)]
-        for time, readings, figures in zip(hold.time_s, here, _figures(here), strict=True):
-            mean, sd = _moments(readings)
+    for hold, readings in _of_holds(drawn, request):
+        answered = _answered(readings)
+        enough = answered.mean() >= _ANSWERED
+        here = readings[:, answered] if enough else np.full((len(readings), 2), np.nan)
+        for time, values, figures in zip(hold.time_s, here, _figures(here), strict=True):
+            mean, sd = _moments(values)
             rows.append([experiment, hold.number, hold.setting, float(time), mean, sd, *figures])
     return rows
+
+
+def without_readings(drawn: Mapping[int, Floats], request: ProtocolRequest) -> list[Notice]:
+    """A warning where draws have no reading, as under a weight that their wire cannot carry.
+
+    Parameters
+    ----------
+    drawn, request
+        As for `mixture_table`.
+    """
+    shares = {}
+    for hold, readings in _of_holds(drawn, request):
+        without = 1.0 - float(_answered(readings).mean())
+        if without > 0.0:
+            shares[hold.number] = (without, f"{hold.setting:g} {SET_UNIT[hold.control]}")
+    if not shares:
+        return []
+    number = max(shares, key=lambda number: shares[number][0])
+    most, setting = shares[number]
+    text = (
+        f"{holds_in_words(list(shares))}: in up to {100 * most:.3g} % of the draws (hold {number}, at {setting}) the "
+        "model has no reading, for the wire cannot carry what is set: the figures are of the other draws"
+    )
+    if most > 1.0 - _ANSWERED:
+        text += ", and left empty where these are the fewer"
+    return [Notice("extrapolation", text)]
+
+
+def _of_holds(drawn: Mapping[int, Floats], request: ProtocolRequest) -> Iterator[tuple[Hold, Floats]]:
+    """Each requested hold with its readings (R, n)."""
+    positions = np.flatnonzero(request.prediction.requested).tolist()
+    for hold, position in zip(request.holds, positions, strict=True):
+        yield hold, drawn[position][: len(hold.time_s)]
+
+
+def _answered(readings: Floats) -> Bools:
+    """(n,) which draws of readings (R, n) have all of them."""
+    return np.all(np.isfinite(readings), axis=0)
 
 
 def _moments(readings: Floats) -> tuple[float, float]:
@@ -96,13 +127,14 @@ def unlikely_readings(members: Members, seed: int) -> list[Notice]:
     if request.stored.likelihood == "hold" or not given.any():  # each hold starts from its own reading
         return []
     blind = [(probability, _blind(member)) for probability, member in members]
-    drawn = _drawn(blind, seed, _FEW)
-    positions = np.flatnonzero(prediction.requested).tolist()
+    drawn = drawn_readings(blind, seed, _FEW)
+    firsts = prediction.first[prediction.requested]
     out = []
-    for hold, position in zip(request.holds, positions, strict=True):
-        if not given[position]:
+    for (hold, readings), first in zip(_of_holds(drawn, request), firsts, strict=True):
+        if not np.isfinite(first):
             continue
-        doubt = _far_off(hold, prediction.first[position], drawn[position][0])
+        answered = readings[0, _answered(readings)]
+        doubt = _far_off(hold, first, answered)
         if doubt is not None:
             out.append(Notice("data", doubt))
     return out
@@ -117,6 +149,8 @@ def _blind(request: ProtocolRequest) -> ProtocolRequest:
 
 def _far_off(hold: Hold, read: float, drawn: Floats) -> str | None:
     """What speaks against a first reading that is far from its predicted draws (n,)."""
+    if len(drawn) < 2:
+        return None
     mean = drawn.mean()
     sd = drawn.std(ddof=1)
     distance = abs(read - mean)
@@ -165,50 +199,6 @@ def beyond_tested(rows: Sequence[Sequence[Any]], stored: Stored) -> list[Notice]
             "bands take creep to go on by the fitted law, and are too narrow where it does not"
         )
     return [Notice("extrapolation", text) for text in out]
-
-
-def _drawn(members: Members, seed: int, draws: int) -> dict[int, Floats]:
-    """The readings (R, n) of each requested hold by all models, each with as many draws as it is probable there."""
-    _, first = members[0]
-    asked = first.prediction
-    rng = np.random.default_rng(seed_of(seed, "predict", first.stored.sample.name))
-    # given readings may make any of them the only one that is left
-    each = draws if np.isfinite(asked.first[asked.requested]).any() else 0
-    readings = []
-    log_weights = []
-    for probability, request in members:
-        stored = request.stored
-        own_draws = max(each, ceil(probability * draws), _LEAST)
-        theta = stored.theta[evenly(len(stored.theta), own_draws)]
-        own = draw_unconditioned(stored.problem, theta, stored.sample, request.prediction, rng)
-        with np.errstate(divide="ignore"):
-            log_weight = np.full(len(own), np.log(probability))
-        if stored.likelihood == "chain":
-            log_weight += log_density_of_given(own, request.prediction)
-            own = given_first(own, request.prediction)
-        readings.append(own)
-        log_weights.append(log_weight)
-    shares = _shares(np.array(log_weights))
-    positions = np.flatnonzero(asked.requested).tolist()
-    return {j: _mixed([own[j] for own in readings], shares[:, j], draws) for j in positions}
-
-
-def _shares(log_weight: Floats) -> Floats:
-    """(m, H) probabilities of m models from log weights (m, H); all alike where no model predicts what was read."""
-    possible = np.where(np.isfinite(log_weight).any(axis=0), log_weight, 0.0)
-    return np.exp(possible - log_sum(possible))
-
-
-def _mixed(readings: Sequence[Floats], share: Floats, draws: int) -> Floats:
-    """Draws (R, n) of several models, each as often as its share says, as many as each of them has enough for."""
-    with np.errstate(divide="ignore"):
-        enough_for = [own.shape[1] / part for own, part in zip(readings, share, strict=True)]
-    enough = min(draws, *enough_for)
-    parts = []
-    for own, part in zip(readings, share, strict=True):
-        count = round(part * enough)
-        parts.append(own[:, evenly(own.shape[1], count)])
-    return np.concatenate(parts, axis=1)
 
 
 class Prediction(xr.Dataset):  # type: ignore[no-untyped-call]  # xarray's __init_subclass__

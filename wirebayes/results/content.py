@@ -221,7 +221,8 @@ def _stacked(members: Sequence[Sample], values: Mapping[str, Array]) -> Array:
 def _readings(members: Sequence[Sample], values: Mapping[str, Array], shape: tuple[int, ...]) -> dict[str, Variable]:
     """Readings of each hold, and their mean, which has the dimensions of the log-likelihood."""
     read = _stacked(members, values)
-    means = np.nanmean(read, axis=2)
+    counts = np.isfinite(read).sum(axis=2)
+    means = np.where(counts > 0, np.nansum(read, axis=2) / np.maximum(counts, 1), np.nan)
     steps = ("chain", "draw") if shape else ()
     name = _name(members, READ, READING)
     mean_name = "hold_mean" if name == READING else f"hold_mean_{UNIT[name]}"

@@ -90,15 +90,16 @@ def in_a_sentence(predicted: Prediction) -> str:
     holds = predicted["hold"].values
     first = np.flatnonzero(holds == holds[0])
     setting = f"{predicted[SET[control]].values[0]:g} {SET_UNIT[control]}"
+    hold = f"Hold {holds[0]} of {predicted.attrs['experiment']}, at {setting},"
+    others = len(np.unique(holds)) - 1
+    more = f"; {counted(others, 'more hold')} below" if others else ""
+    middle, _, _ = _figures(predicted, int(first[0]))
+    if np.isnan(middle):
+        return f"{hold} has no predicted reading: in most draws the wire cannot carry what is set{more}."
     course = _at(predicted, int(first[0]))
     if len(first) > 1:
         course += f" and {_at(predicted, int(first[-1]))}"
-    others = len(np.unique(holds)) - 1
-    more = f"; {counted(others, 'more hold')} below" if others else ""
-    return (
-        f"Hold {holds[0]} of {predicted.attrs['experiment']}, at {setting}, is expected to read {course}; "
-        f"90 % intervals in brackets{more}."
-    )
+    return f"{hold} is expected to read {course}; 90 % intervals in brackets{more}."
 
 
 def _at(predicted: Prediction, row: int) -> str:
