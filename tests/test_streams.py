@@ -13,7 +13,7 @@ from wirebayes.report.blocks import files_beside
 from wirebayes.report.page import _way
 
 ROOT = Path(__file__).parents[1]
-CHECK = ["check", str(ROOT / "data" / "paper" / "experiments.toml"), "--experiment", "nylon-1.5m"]
+CHECK = ["check", str(ROOT / "data" / "paper" / "experiments.toml"), "--experiment", "roc-line-1.71m"]
 NO_ROOM = "standard output: cannot be written (No space left on device), expected room for what is printed\n"
 CLOSED = ">&-", "<&- >&- 2>&-", "| true", "2>&1 | head -c 1"
 LATER = {"check": CLOSED[::3], "effects": CLOSED[1:3]}  # in the full tests, for commands that load much: half of each

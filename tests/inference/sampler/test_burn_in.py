@@ -14,7 +14,7 @@ from wirebayes.inference.sampler import burn_in, proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.overlooked import left_by_search, overlooked_nats
 from wirebayes.inference.sampler.points import WeightedPoints
-from wirebayes.inference.sampler.settings import EXPLORING_SHARES, OUTWEIGHS, ROUGH_SHARES, SHARES
+from wirebayes.inference.sampler.settings import EXPLORING_SHARES, LOOKED_AT, OUTWEIGHS, ROUGH_SHARES, SHARES
 from wirebayes.inference.sampler.start import finite_draws, overdispersed
 from wirebayes.inference.sampler.state import BurnIn, Kept, Learned, Sampling, Walkers
 from wirebayes.numeric.resampling import effective_number
@@ -92,6 +92,22 @@ def test_what_the_proposal_overlooks_is_measured_in_nats(shift: float, witness: 
     learned = Learned(NORMAL, NORMAL, 1, left)
     found = overlooked_nats(learned, z, base + ratios + 100.0 if left is None else base + ratios)
     assert found == pytest.approx((4.99, 0.0 if witness is None else 4.9 + shift), abs=0.011)
+
+
+def test_of_many_kept_draws_some_evenly_spread_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the first to the last: a neck that the last tenth of the steps found shows as it does among all."""
+    n = 6 * LOOKED_AT
+    z = np.zeros((n, D))
+    ratios = np.where(np.arange(n) < 0.9 * n, 0.0, 9.0)
+    counts: list[int] = []
+
+    def density(self: object, places: np.ndarray) -> np.ndarray:
+        counts.append(len(places))
+        return np.zeros(len(places))
+
+    monkeypatch.setattr(type(NORMAL), "log_density", density)
+    assert overlooked_nats(Learned(NORMAL, NORMAL, 1), z, ratios) == (9.0, 0.0)
+    assert counts == [LOOKED_AT]
 
 
 @pytest.mark.parametrize(("share", "counts"), [(1e-2, True), (1e-4, False)])

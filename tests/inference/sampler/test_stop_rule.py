@@ -181,6 +181,8 @@ def after(steps: int, ess: float, memory: float = 1.0, evaluations: int = 0, **l
         (128, 2000.0, 1.0, 4000, 64),  # effective draws grow with the steps: half as many again are missing
         (128, 1900.0, 1.0, 4000, 96),  # 74 steps are missing; whole blocks
         (128, 2900.0, 1.0, 4000, 32),  # five steps would do; a block is the least
+        (256, 2900.0, 1.0, 4000, 32),  # or an eighth
+        (264, 2900.0, 1.0, 4000, 64),  # 33 steps are an eighth of these
         (128, 500.0, 1.0, 4000, 128),  # no further than it has looked
         (128, 2900.0, 31.0, 4000, 32),  # five autocorrelation times are 155 steps
         (128, 2900.0, 33.0, 4000, 64),  # 165

@@ -8,6 +8,7 @@ from wirebayes.inference.convergence import ENOUGH
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in, stop_rule
+from wirebayes.inference.sampler.settings import LEAST_AHEAD
 from wirebayes.inference.sampler.state import BurnIn, Kept, Sampling, advance, move_of
 
 
@@ -56,7 +57,7 @@ def more(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
 
 
 def block_steps(state: Sampling, policy: Policy) -> int:
-    """As many steps as the last look promises to be enough, in whole blocks, but no more than were kept so far.
+    """As many steps as the last look promises to be enough, in whole blocks: of those kept so far an eighth to all.
 
     One block of a new proposal before the first look: it shows whether it is to be learned once more.
     """
@@ -65,5 +66,5 @@ def block_steps(state: Sampling, policy: Policy) -> int:
     if last is None:
         return min(policy.block, policy.most_steps - kept)
     short = max(policy.ess / last.ess.min() - 1.0, ENOUGH * last.autocorrelation.max() / kept - 1.0)
-    blocks = np.ceil(np.clip(kept * short, 1, kept) / policy.block)
+    blocks = np.ceil(np.clip(kept * short, LEAST_AHEAD * kept, kept) / policy.block)
     return min(policy.block * int(blocks), policy.most_steps - kept)

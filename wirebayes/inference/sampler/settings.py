@@ -66,10 +66,14 @@ GOOD_ACCEPTANCE = 0.25  # burn-in goes on below it; with a quarter accepted, ind
 LONGEST_SETTLING = 8
 POOL = 64  # steps of which one does not trust the frozen proposal; more gain little
 
+# How far a run goes on before the next look.
+LEAST_AHEAD = 0.125  # of the steps kept: each look judges all draws, so that many looks cost more than a few more steps
+
 # What the frozen proposal overlooks.
 # nats a coordinate from the density at a typical place of a normal hill to its mass, where it is as wide as the prior
 WIDEST = 0.5 * float(1.0 + np.log(2.0 * np.pi / LEAST_CURVATURE))
 NEXT_TO_NOTHING = float(np.log(1e-3))  # share of the mass: far less than shows in any summary
+LOOKED_AT = 50_000  # kept draws, of more some evenly spread: fifty of them lie beyond the 99.9 % quantile
 OUTWEIGHS = float(np.log(POOL / 2))  # nats: a place worth half a pool of typical ones keeps its walker for long
 
 # The proposal learned again from kept draws.
