@@ -40,7 +40,9 @@ def ends_of(value: np.ndarray, z: np.ndarray, converged: np.ndarray) -> Optimum:
 
 def shared(blocks: list[Any], added: float) -> refit._Amplitude:
     """An amplitude that blocks share, with a constant for its prior."""
-    return refit._Amplitude(blocks, 0.0, -np.inf, np.inf, 1.0, lambda amplitudes: np.full(len(amplitudes), added))
+    return refit._Amplitude(
+        blocks, 0.0, -np.inf, np.inf, np.inf, 1.0, lambda amplitudes: np.full(len(amplitudes), added)
+    )
 
 
 def refitted(
@@ -220,6 +222,9 @@ def test_amplitudes_from_a_half_to_forty_and_the_scan_s_guess_are_tried_first(mo
     assert tried(monkeypatch, 9.0, bounded)[0] == pytest.approx(
         [-4.0, -3.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 12.0]
     )
+    # of a share near its end, too
+    share = SimpleNamespace(amplitudes=[SimpleNamespace(prior=stats.uniform(0.0, 0.06), neutral=0.0)])
+    assert tried(monkeypatch, 9.0, share)[0] == pytest.approx([*steps, 45.0, 54.0, 58.2])
 
 
 def test_a_top_within_is_tried_where_a_parabola_has_it(monkeypatch: pytest.MonkeyPatch) -> None:

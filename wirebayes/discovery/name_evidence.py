@@ -11,7 +11,7 @@ from scipy.special import logsumexp
 from wirebayes.discovery.linear_scan import expand
 from wirebayes.discovery.noise_integral import projected
 from wirebayes.discovery.probes import Probe
-from wirebayes.discovery.refit import LARGEST, Refit, refit
+from wirebayes.discovery.refit import LARGEST, Refit, is_share, refit
 from wirebayes.discovery.scans import Scan
 from wirebayes.discovery.screening import Candidate, best_probes, scanned
 from wirebayes.discovery.subsets import over_subsets
@@ -230,6 +230,9 @@ def reaches(
 ) -> dict[_Place, float]:
     """Distance from neutral at which each form has δ = `LARGEST` in the noise of fits without effects.
 
+    A share reaches to its own end: where the parameters of a fit without it differ most from those of a fit with nearly
+    all of it, δ says nothing of how it looks there.
+
     Parameters
     ----------
     blocks : sequence of LaplaceFit
@@ -242,8 +245,9 @@ def reaches(
     for c in candidates:
         square = sum(squares[b][c.probe] for b in c.blocks)
         per_unit = float(np.sqrt(square))
-        own = LARGEST / per_unit if per_unit > 0.0 else np.inf
-        place = trials[c.probe].effect.key, c.blocks
+        effect = trials[c.probe].effect
+        own = LARGEST / per_unit if per_unit > 0.0 and not is_share(effect) else np.inf
+        place = effect.key, c.blocks
         # of the ladder of a nonlinear form, and of its shapes, the one that reaches farthest
         out[place] = max(out.get(place, 0.0), own)
     return out

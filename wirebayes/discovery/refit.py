@@ -28,6 +28,9 @@ _ROUNDING = 1e-9  # of a reach, which a grid may end on, and of amplitudes that 
 # δ of the first amplitudes tried, doubling up to `LARGEST`; around the best the grid is refined later. The scan's unit
 # may be too large where the parameters bend themselves to the effect, so that it begins below what could be seen.
 _DELTAS = np.array([0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0])
+# of the way from the far end of a share to neutral: creep that is nearly all permanent fits by another amount and
+# another exponent, and a climb that comes from little of it meets a valley on the way
+_FAR_END = np.array([0.25, 0.1, 0.03])
 # of its prior's standard deviation, the most that an amplitude of δ = 1 may be: where the parameters of the fit without
 # the effect bend themselves to it, the scan sees nothing, and its unit has no end
 _LARGEST_UNIT = 0.1
@@ -65,6 +68,18 @@ class Refit:
     amplitude: float
     sd: float
     theta: tuple[Array, ...]
+
+
+def is_share(effect: Effect) -> bool:
+    """Whether an effect's amplitude goes from neutral to an end, as a share does.
+
+    Parameters
+    ----------
+    effect : Effect
+    """
+    main = effect.amplitudes[0]
+    least, most = main.prior.support()
+    return bool(least == main.neutral and np.isfinite(most))
 
 
 def occam(one_sided: bool) -> float:
@@ -115,6 +130,8 @@ class _Amplitude:
         The blocks with the effect, the amplitude of which is given.
     neutral, low, high : float
         Where it changes nothing, and its ends.
+    most : float
+        The end of its prior, infinite but for a share.
     per_delta : float
         What amounts to δ = 1.
     added : function of (a,) amplitudes to (a,)
@@ -125,6 +142,7 @@ class _Amplitude:
     neutral: float
     low: float
     high: float
+    most: float
     per_delta: float
     added: Function
 
@@ -149,7 +167,7 @@ class _Amplitude:
         unit = min(per_delta, _LARGEST_UNIT * finite_spread(prior))
         log_prior = within(prior, main.neutral, reach)
         without = sum(block.log_evidence for block in blocks)
-        return cls(pinned, main.neutral, low, high, unit, lambda amplitudes: log_prior(amplitudes) - without)
+        return cls(pinned, main.neutral, low, high, most, unit, lambda amplitudes: log_prior(amplitudes) - without)
 
     @property
     def one_sided(self) -> bool:
@@ -159,6 +177,8 @@ class _Amplitude:
         """The amplitudes tried first, with one that is guessed."""
         steps = np.append(_DELTAS, max(abs(guess) / self.per_delta, 0.3)) * self.per_delta
         grid = self.neutral + (steps if self.one_sided else np.concatenate([steps, -steps]))
+        if self.one_sided and np.isfinite(self.most):
+            grid = np.append(grid, self.most - _FAR_END * (self.most - self.neutral))
         return np.unique(np.clip(grid, self.low, self.high))
 
     def outwards(self, from_: float) -> Array:
