@@ -2,7 +2,8 @@
 
 The prior of an amplitude is the catalogue's density as far as the effect does not exceed δ = `LARGEST` in the noise of
 the plain fit, integrated to one: a wide catalogue does not count against an effect, and an amplitude that is hardly
-possible does. Fits with the effect inside, folds, samples and predictions have the same density.
+possible does. A share has an end of its own, and is not cut off. Fits with the effect inside, folds, samples and
+predictions have the same density.
 """
 
 from collections.abc import Mapping, Sequence
