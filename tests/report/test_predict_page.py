@@ -36,6 +36,17 @@ def test_a_hold_without_a_predicted_reading_is_said_to_have_none() -> None:
         "Hold 8 of kite, at 12 N, has no predicted reading: in most draws the wire cannot carry what is set; "
         "1 more hold below."
     )
+    drawn = dataset([*rows(), *[[*row[:1], row[1] + 2, *row[2:]] for row in empty]], ABOUT, "force")  # type: ignore[operator]
+    _, labels = drawn.plot().get_legend_handles_labels()
+    assert labels == ["hold 8, 12 N", "hold 9, 13 N"]
+
+
+def test_a_page_without_figures_has_no_picture(tmp_path: Path) -> None:
+    table = tmp_path / "next.csv"
+    table.write_text("rows")
+    empty = [[*row[:4], *[float("nan")] * 5] for row in rows()]
+    assert "<img" not in write_beside(dataset(empty, ABOUT, "force"), table).read_text(encoding="utf-8")
+    assert "<img" in write_beside(dataset(rows(), ABOUT, "force"), table).read_text(encoding="utf-8")
 
 
 def test_under_weights_millimetres_are_read() -> None:

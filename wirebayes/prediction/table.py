@@ -285,7 +285,8 @@ class Prediction(xr.Dataset):  # type: ignore[no-untyped-call]  # xarray's __ini
             axes = plt.subplots()[1]
         control = self._control
         unit = READ_UNIT[control]
-        holds = np.unique(self["hold"].values)
+        is_known = np.isfinite(self[f"q50_{unit}"].values)
+        holds = np.unique(self["hold"].values[is_known])
         named = holds[evenly(len(holds), _MOST_NAMED)]
         for hold in holds:
             rows = self.isel(reading=np.flatnonzero(self["hold"].values == hold))

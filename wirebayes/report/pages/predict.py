@@ -62,13 +62,9 @@ def predict_page(predicted: Prediction, table: Path) -> Page:
     texts = about.get("warnings", ())
     notices: list[NoticeJson] = [{"kind": kind, "text": text} for kind, text in zip(kinds, texts, strict=True)]
     warned: Warned = {"warnings": notices}
-    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
-    predicted.plot(figure.subplots())
-    alt = f"Predicted readings of {name} against the time in each hold, medians and 90 % bands."
-    picture = Picture(drawn(figure), alt, _CAPTION)
     blocks: list[Block] = [
         *before_the_answer(warned),
-        Pictures([picture]),
+        *_pictures(predicted),
         *beside_the_answer(warned),
         Text(as_sentence(about["prediction"])),
         _rows(predicted),
@@ -77,6 +73,19 @@ def predict_page(predicted: Prediction, table: Path) -> Page:
     sections = [Section(name, blocks), files_beside(table.parent, files)]
     lead = in_a_sentence(predicted)
     return Page("What later holds will read", lead, sections, f"Seed {about['seed']}.")
+
+
+def _pictures(predicted: Prediction) -> list[Block]:
+    """The medians and bands of the holds that have any."""
+    middle = predicted[f"q50_{READ_UNIT[_control(predicted)]}"].values
+    if np.isnan(middle).all():
+        return []
+    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
+    predicted.plot(figure.subplots())
+    alt = (
+        f"Predicted readings of {predicted.attrs['experiment']} against the time in each hold, medians and 90 % bands."
+    )
+    return [Pictures([Picture(drawn(figure), alt, _CAPTION)])]
 
 
 def in_a_sentence(predicted: Prediction) -> str:
