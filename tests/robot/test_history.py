@@ -299,14 +299,30 @@ def test_readings_move_draws_to_the_posterior_of_a_linear_problem():
         found.add(of, slope[k], y[k] - z[:, :d] @ slope[k] - of.offset * z[:, d:], 1.0)
     after = z + found.moves(np.zeros((n, d + m)), rng.standard_normal((n, d + m)))
     H = np.concatenate([np.concatenate([slope[k].T, np.diag(of.offset)], 1) for k in range(t)])
-    inside = np.linalg.inv(np.eye(d + m) + H.T @ np.diag(np.tile(of.noise**-2, t)) @ H)
-    mean = inside @ H.T @ (np.tile(of.noise**-2, t) * y.ravel())
+    inside = np.linalg.inv(np.eye(d + m) + H.T @ np.diag(np.tile(of.error**-2, t)) @ H)
+    mean = inside @ H.T @ (np.tile(of.error**-2, t) * y.ravel())
     np.testing.assert_allclose(after.mean(0), mean, atol=0.03)
     np.testing.assert_allclose(np.cov(after.T), inside, atol=0.03)
     np.testing.assert_allclose(found.sd, np.sqrt(np.diag(inside)))
-    # what stays of a sensor's error is never averaged away
-    assert np.isclose(of.noise**2 + of.offset**2, of.sd**2).all()
-    assert found.sd[d + 1] > 0.1
+    assert found.sd[d + 1] > 0.1  # what stays of a sensor's error is never averaged away
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.25, 0.5])
+def test_bands_are_not_too_narrow_whatever_share_of_an_error_up_to_a_half_stays(kept):
+    rng = np.random.default_rng(1)
+    d, t = 4, 6
+    of = Sensors(np.array([0.3]), np.zeros(1))
+    slope = rng.standard_normal((t, d, 1))
+    found = Information.none(d, 1, 1)
+    for row in slope:
+        found.add(of, row, np.zeros((1, 1)), 1.0)
+    claimed = np.linalg.inv(found.matrix + np.eye(d + 1))[:d]
+    H = np.concatenate([slope[..., 0], np.full((t, 1), of.offset[0])], 1)
+    gain = claimed @ H.T / of.error[0] ** 2
+    of_readings = of.error[0] ** 2 * ((1.0 - kept) * np.eye(t) + kept)
+    left = np.eye(d) - gain @ slope[..., 0]
+    errors = left @ left.T + gain @ of_readings @ gain.T
+    assert np.linalg.eigvalsh(claimed[:, :d] - errors).min() > -1e-12
 
 
 def _curved(z0, z1):
@@ -349,7 +365,7 @@ def test_draws_given_readings_are_those_of_a_curved_posterior(tension, read, lea
     grid = np.linspace(-4, 4, 81)
     z = np.stack(np.meshgrid(grid, grid, grid, indexing="ij"))
     left = np.array(read) - tension(z[0], z[1]) - of.offset[0] * z[2][..., None]
-    weight = np.exp(-0.5 * ((left / of.noise[0]) ** 2).sum(-1) - 0.5 * (z**2).sum(0))
+    weight = np.exp(-0.5 * ((left / of.error[0]) ** 2).sum(-1) - 0.5 * (z**2).sum(0))
     weight /= weight.sum()
     for i in range(2):
         mean = (weight * z[i]).sum()

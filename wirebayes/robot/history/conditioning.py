@@ -57,7 +57,7 @@ class LogReadings:
 
     def cost(self, residual: Floats, white: Floats) -> Floats:
         """Twice the negative log of the posterior density, ``(n,)``; infinite where a platform fell that was read."""
-        scaled = self.counts[:, None] * (residual / self.of.noise) ** 2
+        scaled = self.counts[:, None] * (residual / self.of.error) ** 2
         squares = np.nansum(scaled, (1, 2)) + (white**2).sum(1)
         return np.where(self.missed(residual), np.inf, squares)
 

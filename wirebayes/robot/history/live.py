@@ -353,7 +353,7 @@ class LiveEstimator:
         since = None if self._last == -np.inf else time_s - self._last
         counts = reading_weight(since)
         normal = self._rng.standard_normal((n, len(y)))
-        noise = of.noise * normal / np.sqrt(counts)
+        noise = of.error * normal / np.sqrt(counts)
         left = y - predicted[:n] - of.offset * self._offset + noise
         left = chosen_rows(self._live[:n], left, np.nan)
         self._information.add(of, slopes(predicted[n:]), left, counts)

@@ -16,7 +16,7 @@ from wirebayes.robot.history.unknowns import Uncertain
 from wirebayes.robot.mechanics.description import Robot
 
 TOGETHER_S = 1.0  # readings nearer in time count as one: a sensor's noise at a controller's rate is not independent
-_OFFSET = 0.5  # share of a reading's variance that the sensor keeps as an offset
+_OFFSET = 0.5  # variance of a sensor's offset beside a reading's error, as a share of that variance
 
 
 @dataclass(frozen=True)
@@ -36,13 +36,8 @@ class Sensors:
 
     @property
     def sd(self) -> Floats:
-        """(m,) standard deviations of all that a reading is off by."""
+        """(m,) standard deviations of a reading as they are stated."""
         return np.hypot(self.error, self.bias)
-
-    @property
-    def noise(self) -> Floats:
-        """(m,) standard deviations of what differs from reading to reading."""
-        return self.error * np.sqrt(1.0 - _OFFSET)
 
     @property
     def offset(self) -> Floats:
@@ -112,12 +107,12 @@ class Information:
         if not there.any():
             return
         H = np.concatenate([slope, np.diag(of.offset)])
-        noise, left = of.noise, residual
+        error, left = of.error, residual
         if not there.all():
             H = H[:, there]
-            noise = noise[there]
+            error = error[there]
             left, known = left[:, there], known[:, there]
-        scaled = H * (counts / noise**2)
+        scaled = H * (counts / error**2)
         if not known.all():
             left = np.where(known, left, np.nanmean(left, 0))  # a fallen draw has no say
         self.matrix += scaled @ H.T

@@ -32,8 +32,8 @@ class Uncertain:
     spread : float
         Relative, of stiffness, creep amount and rate from wire to wire of one line.
     tension_N, tilt_rad : float
-        Standard error of a reading. Half its variance is an offset that the sensor keeps, so that no number of
-        readings says more than that.
+        Standard error of a reading. Beside it the sensor may keep an offset of half that variance, so that no number
+        of readings says more than that.
     calibrated : Calibrated, optional
         What a calibration left known of lengths and wires, in the place of reference error and spread. The history
         then goes on where its session ended.
