@@ -26,7 +26,8 @@ from wirebayes.model.problem import with_readings
 from wirebayes.model.replicate import readings
 from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.numeric.typing import Array
-from wirebayes.planning.widths import at_centre, expected_widths
+from wirebayes.planning.guessed_test import at_centre
+from wirebayes.planning.widths import expected_widths
 from wirebayes.processes.workers import as_finished, processes
 from wirebayes.simulation.synthetic import Bench
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from shutil import copytree
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,9 +15,10 @@ from wirebayes.commands import plan_content
 from wirebayes.commands.wires import robot_of
 from wirebayes.effects import CATALOGUE
 from wirebayes.io.run_folder import read_json, write_json
-from wirebayes.model.spec import ModelSpec
 from wirebayes.planning import sensitivity
+from wirebayes.results.mixture import write_mixture
 from wirebayes.robot.mechanics import schema
+from wirebayes.wire.model import PLAIN
 
 FIELD = Path(__file__).parents[1] / "robot" / "field"
 FEW = wb.Policy(walkers=32, ess=100, rounds=2, most_rounds=2, round_draws=512, block=8, most_steps=16, r_hat=99)
@@ -103,12 +105,14 @@ def test_a_robot_that_nothing_holds_at_home_has_no_drift():
     """Nor does numpy complain of medians of nothing: warnings are errors here."""
     robot = schema.read_robot_file("cogiro-desk")
     high = replace(robot, home_m=robot.home_m + [0.0, 0.0, 1.0])
-    law = ModelSpec()
     draws = {name: np.full(3, value) for name, value in {"k1": 5e3, "B": 0.1, "U": 0.6, "k2": 0.01, "N": 0.6}.items()}
-    judged = SimpleNamespace(test=SimpleNamespace(length_mm=1e3), expected=SimpleNamespace(draws=[draws, draws]))
+    judged = SimpleNamespace(
+        test=SimpleNamespace(length_mm=1e3), expected=SimpleNamespace(draws=[draws, draws], model=PLAIN)
+    )
     guess = SimpleNamespace(draws=draws, length_mm=1e3)
-    assert plan_content._drift(judged, guess, high, law) is None
-    assert plan_content._drift(judged, guess, robot, law)["drift_mm"] > 0
+    request = SimpleNamespace(guess=guess, model=PLAIN)
+    assert plan_content._drift(judged, request, high) is None
+    assert plan_content._drift(judged, request, robot)["drift_mm"] > 0
 
 
 def test_a_plan_file_is_ranked_within_its_budget(plan_file, tmp_path, capsys):
@@ -329,8 +333,42 @@ def test_a_fits_folder_is_planned_with_the_priors_and_the_laws_of_that_fit(measu
         wb.plan(tmp_path / "fit", tests=4, history="additive")
 
 
-def test_effects_of_a_fit_that_a_plan_leaves_out_are_said(measured, tmp_path):
-    wb.fit(measured, effects=["toe"], check=False, policy=FEW, output=tmp_path / "fit")
-    planned = wb.plan(tmp_path / "fit", tests=4)
-    (notice,) = (one for one in planned.summary()["warnings"] if one["kind"] == "left-out")
-    assert notice["text"].startswith("wire was fitted with toe: the plan simulates and fits without")
+def _warned(planned):
+    return [one["text"] for one in planned.summary()["warnings"] if one["kind"] == "left-out"]
+
+
+def test_lasting_effects_of_a_fit_are_planned_with_and_others_said_to_be_left_out(measured, plan_file, tmp_path):
+    wb.fit(measured, effects=["toe"], check=False, policy=FEW, output=tmp_path / "toe")
+    planned = wb.plan(tmp_path / "toe", tests=4)
+    assert not _warned(planned)
+    assert "toe.w" in planned.summary()["guess"]["parameters"]
+    assert planned.summary()["guess"]["source"] == "the posterior of wire in toe, with toe"
+    assert planned.best["parameters"]["toe.w"]["unit"] == "mm"
+    assert "toe" not in planned.best["effects"]  # it is not missing
+    assert not any(sentence.startswith("toe: ") for sentence in planned.best["not_identifiable"])
+    wb.fit(measured, effects=["prior_creep"], check=False, policy=FEW, output=tmp_path / "crept")
+    (said,) = _warned(wb.plan(tmp_path / "crept", tests=4))
+    assert said.startswith("wire was fitted with prior creep: the plan simulates and fits without")
+    head, _, rest = PLAN.partition("[guess]")
+    text = f'{head}posterior = "{tmp_path / "toe"}"\n[[protocol]]{rest.partition("[[protocol]]")[2]}'
+    plan_file.write_text(text.replace('robot = "linear-7"\n', ""))
+    (said,) = _warned(wb.plan(plan_file, tests=4))  # of other lengths and benches
+    assert said.startswith("wire was fitted with toe")
+
+
+def test_a_plan_after_discover_has_the_final_model_where_it_is_decided(fitted, measured, tmp_path):
+    found = tmp_path / "found"
+    final = found / "wire" / "final"
+    wb.fit(measured, effects=["toe"], check=False, policy=FEW, output=tmp_path / "toe")
+    copytree(fitted / "wire", found / "wire" / "plain")
+    copytree(tmp_path / "toe" / "wire", final)
+    found_there = {
+        "wire": {"verdict": "nothing-missing", "warnings": [], "set": ["toe"], "group": ["toe", "sensor_drift"]}
+    }
+    write_json(found / "discovery.json", {"version": 1, "experiments": found_there})
+    decided = wb.plan(found, tests=4)
+    assert "toe.w" in decided.best["parameters"] and decided.summary()["aim"] == ["parameters"]
+    asked = wb.plan(found, tests=4, aim=["toe", "sensor_drift"])
+    assert "toe.w" not in asked.best["parameters"] and asked.best["score"] > 0
+    write_mixture(final, [(".", 0.6, ["toe"]), ("../plain", 0.4, [])])
+    assert "toe.w" not in wb.plan(found, tests=4).best["parameters"]

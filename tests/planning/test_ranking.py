@@ -4,11 +4,12 @@ from wirebayes.planning.ranking import Judged, ranked, too_long
 from wirebayes.planning.sensitivity import Sensitivity
 from wirebayes.planning.widths import Expected
 from wirebayes.simulation.synthetic import Bench
+from wirebayes.wire.model import PLAIN
 
 
 def judged(name, bits, creep_sd, cosine=0.0, holds=10):
     width = {"sd": creep_sd, "width_90": 0.0, "width_90_low": 0.0, "width_90_high": 0.0, "guess_sd": 1.0, "unit": "mm"}
-    expected = Expected({"creep_1h_mm": width}, 1.0, 1000.0, 60.0, bits, 5, ())
+    expected = Expected({"creep_1h_mm": width}, 1.0, 1000.0, 60.0, bits, 5, PLAIN, ())
     power = {"amplitude_80": 1.0, "unit": "-", "delta_80": 4.0, "delta_prior": 10.0, "confused_with": []}
     effects = Sensitivity({"a": power, "b": power}, {("a", "b"): cosine, ("b", "a"): cosine})
     bench = Bench(name, displacements_mm=tuple(range(1, holds + 1)), times_s=(0.0, 60.0))

@@ -10,12 +10,13 @@ from wirebayes.discovery.global_test import examine
 from wirebayes.discovery.settings import ALPHA
 from wirebayes.effects import CATALOGUE
 from wirebayes.inference.laplace_fit import fitted
-from wirebayes.model.scales import scales_of
+from wirebayes.model.scales import NATURAL, scales_of
 from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.numeric.frozen import frozen
 from wirebayes.planning import sensitivity as module
-from wirebayes.planning.widths import at_centre, central
+from wirebayes.planning.guessed_test import at_centre, central
 from wirebayes.simulation.synthetic import Bench, Truth, draw
+from wirebayes.wire.model import Model
 
 UP = Bench("up", displacements_mm=(1, 2, 3, 4, 5, 6))
 THERE_AND_BACK = Bench("back", displacements_mm=(1, 2, 4, 6, 4, 2))
@@ -56,6 +57,25 @@ def test_delta_is_amplitude_in_units_of_what_is_seen(up):
     ratio = units.of(amplitude.unit) * amplitude.prior.std() / effect["amplitude_80"]
     assert effect["delta_prior"] == pytest.approx(ratio * effect["delta_80"])
     assert 2.0 < effect["delta_80"] < 10.0  # fewer standard deviations are chance, more are plain to see
+
+
+def test_a_bent_wire_is_the_same_whatever_tension_its_bend_refers_to():
+    stiffening = CATALOGUE["power_strain"]()
+    bent = Model(effects=(stiffening,), tension_ref_N=40.0)  # far above what this test reaches
+    known = guess(20) | {stiffening.columns()[0]: np.full(20, 0.2)}
+    test = at_centre(UP.experiment(), known, PLAIN_SPEC, bent)
+    block = module._fit_at(test, central(known), PLAIN_SPEC, bent)
+    assert block.best["k1"] < 0.8 * CENTRE["k1"]  # the stiffness at a lower tension
+    again = at_centre(
+        UP.experiment(), {name: [value] for name, value in block.best.items()}, PLAIN_SPEC, block_model(block)
+    )
+    for one, other in zip(test.holds, again.holds, strict=True):
+        np.testing.assert_allclose(other.readings, one.readings, rtol=1e-6)
+
+
+def block_model(block):
+    (sample,) = block.target.problem.in_units(NATURAL).samples
+    return sample.model
 
 
 def test_nothing_to_look_for_leaves_what_is_absorbed():

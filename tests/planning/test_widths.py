@@ -16,7 +16,8 @@ from wirebayes.model.replicate import readings
 from wirebayes.model.scales import Units
 from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.planning import widths
-from wirebayes.planning.widths import at_centre, expected_widths, middle_tension
+from wirebayes.planning.guessed_test import at_centre, middle_tension
+from wirebayes.planning.widths import expected_widths
 from wirebayes.simulation.synthetic import Bench
 
 CENTRE = {

@@ -12,7 +12,16 @@ from numpy.random import Generator
 from wirebayes._version import __version__
 from wirebayes.commands.options import above_zero, check_priors, check_seed, model_spec, names_given, path_of
 from wirebayes.commands.plan_content import PlanRequest, plan_content, protocol_content
-from wirebayes.commands.predict import find_posterior
+from wirebayes.commands.plan_guess import (
+    decided_posterior,
+    earlier_posterior,
+    experiment_measured,
+    guess_by,
+    lasts,
+    priors_of_fit,
+    spec_of_fit,
+    undecided_effects,
+)
 from wirebayes.commands.wires import RobotLike, hash_of, identity_of, robot_of
 from wirebayes.discovery.next_measurement import other_measurements
 from wirebayes.effects import catalogue, source_of
@@ -21,22 +30,16 @@ from wirebayes.inference.fit import seed_of
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments, select
 from wirebayes.io.plan_file import PlanFile, PlannedTest, is_plan, read_plan
-from wirebayes.io.readings import Hold
-from wirebayes.io.run_folder import CONFIGURATION, open_run, read_json, write_json
-from wirebayes.json_files.discovery import DiscoveryJson
+from wirebayes.io.run_folder import open_run, write_json
 from wirebayes.json_files.plain import plain
-from wirebayes.model.sample import Sample
-from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
-from wirebayes.numeric.frozen import frozen
-from wirebayes.planning.guess import GuessedWire, from_posterior, from_readings, from_tables
+from wirebayes.model.spec import ModelSpec
+from wirebayes.planning.guess import from_readings, from_tables
+from wirebayes.planning.guessed_test import at_centre, middle_tension
 from wirebayes.planning.ranking import Judged, ranked
 from wirebayes.planning.sensitivity import sensitivity
-from wirebayes.planning.widths import at_centre, expected_widths, middle_tension
+from wirebayes.planning.widths import expected_widths
 from wirebayes.processes.workers import computing
 from wirebayes.progress import Progress, silent
-from wirebayes.result_warnings import Notice
-from wirebayes.results import read_back
-from wirebayes.sentences import spoken
 from wirebayes.simulation.synthetic import Bench
 from wirebayes.strict.files import PathLike
 from wirebayes.views.plan import Plan
@@ -120,10 +123,11 @@ def plan(
         above_zero(("--budget-min", budget_min))
     kinds = catalogue(own)
     rng = np.random.default_rng(seed_of(seed, "guess"))
-    request = _request(source, experiment, tests, kinds, spec, own, rng)
+    wanted = () if aim is None else _checked_aim(aim, list(kinds))
+    request = _request(source, experiment, tests, kinds, spec, own, rng, wanted)
     spec = request.spec
-    if aim is not None:
-        request = replace(request, aim=_checked_aim(aim, list(kinds)))
+    if wanted:
+        request = replace(request, aim=wanted)
     if budget_min is not None:
         request = replace(request, budget_min=float(budget_min))
     if robot is not None:
@@ -148,7 +152,7 @@ def plan(
         with computing():
             judged = _judged(request, kinds, spec, seed, progress or silent)
         order = ranked(judged, request.aim, request.budget_min)
-        rows = [protocol_content(j, request, place_in, machine, spec) for place_in, j in enumerate(order, 1)]
+        rows = [protocol_content(j, request, place_in, machine) for place_in, j in enumerate(order, 1)]
         summary = plan_content(rows, request, machine)
         write_json(opened.directory / "plan.json", summary)
         from wirebayes.report.pictures.plan import widths_and_effects  # matplotlib only where it is needed
@@ -165,10 +169,11 @@ def _check_tests(tests: object) -> None:
 
 def _judged(request: PlanRequest, kinds: Kinds, spec: ModelSpec, seed: int, report: Progress) -> list[Judged]:
     """What each test would teach, and what it would show of missing effects."""
+    model = request.model
     planned = []
     for test, words in request.tests:
         guess = request.guess.at(test)
-        planned.append((at_centre(test, guess, spec), words))
+        planned.append((at_centre(test, guess, spec, model), words))
     first, _ = planned[0]
     stated = {  # all state their creep for the same wire
         "tension_N": middle_tension(first),
@@ -182,10 +187,10 @@ def _judged(request: PlanRequest, kinds: Kinds, spec: ModelSpec, seed: int, repo
         own_seed = seed_of(seed, "plan", test.name)
         rng = np.random.default_rng(own_seed)
         try:
-            expected = expected_widths(test, guess, rng, spec, **stated, kept_draws=kept)
+            expected = expected_widths(test, guess, rng, spec, guessed=model, **stated, kept_draws=kept)
         except ValueError as error:
             raise InputError(f"{test.source}, protocol {test.name}: {error} at this guess") from None
-        seen = sensitivity(test, guess, kinds, rng, spec)
+        seen = sensitivity(test, guess, kinds, rng, spec, model)
         judged.append(Judged(test, words, expected, seen))
     report("protocols", len(planned), len(planned))
     return judged
@@ -204,6 +209,7 @@ def _request(
     spec: ModelSpec,
     own: Path | None,
     rng: Generator,
+    aim: tuple[str, ...],
 ) -> PlanRequest:
     """Tests and guess of whatever was given."""
     if isinstance(source, Experiment):
@@ -213,7 +219,7 @@ def _request(
         raise InputError(f"source: found {type(source).__name__}, expected a path or an Experiment")
     path = Path(source)
     if path.is_dir():
-        return _of_folder(path, name, n, kinds, spec, own)
+        return _of_folder(path, name, n, kinds, spec, own, aim)
     if is_plan(path):
         written = read_plan(path, list(kinds))
         return _of_plan(written, name, n, kinds, spec, own, rng)
@@ -243,9 +249,10 @@ def _of_plan(
     if file.posterior is None:
         guess = from_tables(file.guess, file.guess_lines, file.source, planned, n, rng)
     else:
-        earlier, sample, _ = _posterior(file.posterior, name, n, own)
+        stored, _ = earlier_posterior(file.posterior, name, own)
+        earlier = guess_by(stored, file.posterior, n, ())
         about["posterior"] = hash_of(earlier.draws)
-        spec = _spec_of_fit(sample, spec, file.posterior)
+        spec = spec_of_fit(stored.sample, spec, file.posterior)
         guess = earlier.on_benches_of(planned, rng)
     about["guess"] = file.guess
     about["priors"] = file.priors
@@ -255,80 +262,28 @@ def _of_plan(
     return PlanRequest(tests, guess, file.aim, file.budget_min, file.robot, about, spec)
 
 
-def _of_folder(folder: Path, name: str | None, n: int, kinds: Kinds, spec: ModelSpec, own: Path | None) -> PlanRequest:
+def _of_folder(
+    folder: Path,
+    name: str | None,
+    n: int,
+    kinds: Kinds,
+    spec: ModelSpec,
+    own: Path | None,
+    aim: tuple[str, ...],
+) -> PlanRequest:
     """The folder of a fit or discover: the same test again, and others like it, with the priors of that fit."""
-    guess, sample, place = _posterior(folder, name, n, own)
-    spec = _spec_of_fit(sample, spec, folder)
-    measured = replace(_measured(sample, folder), priors=_priors_of_fit(place, sample.name))
-    about = {"posterior": hash_of(guess.draws), "priors": measured.priors}
-    rivals = [effect for effect in _rivals(folder / "discovery.json", sample.name) if effect in kinds]
-    aim = tuple(rivals[:2]) if len(rivals) > 1 else ("parameters",)
-    return PlanRequest(_like(measured), guess, aim, None, None, about, spec)
-
-
-def _spec_of_fit(sample: Sample, asked: ModelSpec, folder: Path) -> ModelSpec:
-    """The plain model of an earlier fit, which its draws belong to; an `InputError` where another was asked for."""
-    model = sample.model
-    options = (
-        ("--elastic-law", asked.law, PLAIN_SPEC.law, model.law),
-        ("--history", asked.history, PLAIN_SPEC.history, model.history),
-    )
-    for option, wanted, left_out, fitted in options:
-        if wanted not in (left_out, fitted):
-            raise InputError(f"{option}: found {wanted}, expected {fitted}, with which {folder} was fitted")
-    return replace(asked, law=model.law, history=model.history)
-
-
-def _priors_of_fit(place: Path, name: str) -> dict[str, dict[str, Any]]:
-    """What was stated before a fit whose posterior lies here: its configuration is there or just above."""
-    here = place.absolute()
-    for folder in (here, *list(here.parents)[:2]):
-        file = folder / CONFIGURATION
-        if file.is_file():
-            priors: dict[str, dict[str, dict[str, Any]]] = read_json(file).get("priors", {})
-            return priors.get(name, {})
-    return {}
-
-
-def _rivals(findings: Path, name: str) -> list[str]:
-    """The effects between which a discovery did not decide, each once."""
-    if not findings.is_file():
-        return []
-    report: DiscoveryJson = read_json(findings)
-    if name not in report["experiments"]:
-        return []
-    found = report["experiments"][name]
-    return list(dict.fromkeys([*found["set"], *found["group"]]))
-
-
-def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tuple[GuessedWire, Sample, Path]:
-    """The guess by a fit, what was fitted, and where the posterior lies."""
-    discovered = any(folder.glob("**/plain/posterior.nc"))
-    model = "plain" if discovered else None
-    which, place = find_posterior(folder, name, model)
-    stored = read_back.load_posterior(place, which, own)
-    if stored.likelihood == "hold":
-        message = "found a fit with --likelihood hold, which knows no preload and no setting error, expected a chain"
-        raise InputError(f"{folder}: {message}")
+    stored, place = decided_posterior(folder, name, own, aim) or earlier_posterior(folder, name, own)
     sample = stored.sample
-    length_mm = sample.protocol.length_mm
-    source = f"the posterior of {sample.name} in {folder.name}"
-    guess = from_posterior(stored.draws, length_mm, source, n)
-    doubts = (*stored.doubts, *_left_out(sample))
-    guess = replace(guess, doubts=doubts, control=sample.protocol.control)
-    return guess, sample, place
-
-
-def _left_out(sample: Sample) -> list[Notice]:
-    """That tests are planned without the effects of the fit, if it has any."""
-    if not sample.model.effects:
-        return []
-    effects = ", ".join(spoken(effect.name) for effect in sample.model.effects)
-    text = (
-        f"{sample.name} was fitted with {effects}: the plan simulates and fits without, and a fit of the whole model "
-        "may know the parameters several times less well than is said"
-    )
-    return [Notice("left-out", text)]
+    lasting = tuple(effect for effect in sample.model.effects if lasts(effect) and effect.name not in aim)
+    guess = guess_by(stored, folder, n, lasting)
+    spec = spec_of_fit(sample, spec, folder)
+    measured = replace(experiment_measured(sample, folder), priors=priors_of_fit(place, sample.name))
+    about = {"posterior": hash_of(guess.draws), "priors": measured.priors}
+    rivals = [effect for effect in undecided_effects(folder / "discovery.json", sample.name) if effect in kinds]
+    of_folder: tuple[str, ...] = ("parameters",)
+    if len(rivals) > 1 and not lasting:  # what is in the model is no rival any more
+        of_folder = tuple(rivals[:2])
+    return PlanRequest(_like(measured), guess, of_folder, None, None, about, spec)
 
 
 def _experiment(test: PlannedTest, file: PlanFile) -> Experiment:
@@ -349,39 +304,6 @@ def _like(measured: Experiment) -> list[tuple[Experiment, str]]:
         test = replace(bench.experiment(), source=measured.source, priors=measured.priors)
         out.append((test, other.words))
     return out
-
-
-def _measured(sample: Sample, folder: Path) -> Experiment:
-    """The experiment of a stored posterior, without its readings' temperatures."""
-    protocol = sample.protocol
-    holds = tuple(_hold(sample, row) for row in range(len(protocol.mask)))
-    return Experiment(
-        sample.name, sample.material, protocol.length_mm, sample.resolution, holds, folder, control=protocol.control
-    )
-
-
-def _hold(sample: Sample, row: int) -> Hold:
-    """One hold of a stored posterior."""
-    protocol = sample.protocol
-    mask = protocol.mask[row]
-    recorded = bool(mask.any())
-    number = int(protocol.number[row]) if recorded else None
-    times = protocol.time_s[row][mask]
-    readings = sample.readings[row, :, 0][mask]
-    temperatures = None
-    if protocol.warming_K is not None and protocol.reference_C is not None and recorded:
-        warm = protocol.warming_K[row][mask] + protocol.reference_C
-        temperatures = frozen(warm.tolist())
-    return Hold(
-        number,
-        float(protocol.setting[row]),
-        float(protocol.duration_s[row]),
-        frozen(times.tolist()),
-        frozen(readings.tolist()),
-        temperatures,
-        float(protocol.start_s[row]),
-        protocol.control,
-    )
 
 
 def _checked_aim(aim: Aim, effects: list[str]) -> tuple[str, ...]:

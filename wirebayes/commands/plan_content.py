@@ -1,6 +1,6 @@
 """What ``plan.json`` says of tests that were judged."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,21 +9,22 @@ from wirebayes.commands.wires import RobotLike
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.plan import JudgedProtocol, PlanJson, RobotDrift
 from wirebayes.json_files.values import Statistics
-from wirebayes.model.sample import MATERIAL, SAMPLE
+from wirebayes.model.sample import MATERIAL
 from wirebayes.model.spec import ModelSpec
 from wirebayes.numeric.typing import Floats
 from wirebayes.planning.guess import GuessedWire
 from wirebayes.planning.ranking import Judged, too_long
-from wirebayes.planning.widths import HOUR_S
+from wirebayes.planning.widths import CREEP, HOUR_S
 from wirebayes.result_warnings import Notice, to_json
 from wirebayes.results.contraction import interval
 from wirebayes.robot.mechanics import draws as robot_draws
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.draws import WireDraws, material
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import drift
 from wirebayes.robot.motion.home import home_notices
 from wirebayes.robot.motion.plausible import robot_notices
+from wirebayes.wire.model import Model
 
 _ROBOT_DRAWS = 60  # of the posterior of each simulated test that moves a robot
 
@@ -40,10 +41,13 @@ class PlanRequest:
     about: dict[str, Any]
     spec: ModelSpec
 
+    @property
+    def model(self) -> Model:
+        """Of the guessed wire, with the laws that tests are fitted with."""
+        return replace(self.guess.model, law=self.spec.law, history=self.spec.history)
 
-def protocol_content(
-    judged: Judged, request: PlanRequest, rank: int, machine: Robot | None, spec: ModelSpec
-) -> JudgedProtocol:
+
+def protocol_content(judged: Judged, request: PlanRequest, rank: int, machine: Robot | None) -> JudgedProtocol:
     """A protocol as it stands in ``plan.json``.
 
     Parameters
@@ -54,7 +58,6 @@ def protocol_content(
         1 is the best.
     machine : Robot, optional
         Whose drift within an hour is foreseen.
-    spec : ModelSpec
     """
     test = judged.test
     expected = judged.expected
@@ -65,7 +68,7 @@ def protocol_content(
     readings = sum(hold.time_s.size for hold in recorded)
     robot = None
     if machine is not None and not machine.is_on_given_wires:
-        robot = _drift(judged, request.guess, machine, spec)
+        robot = _drift(judged, request, machine)
     return {
         "rank": rank,
         "name": test.name,
@@ -78,7 +81,7 @@ def protocol_content(
         "score": judged.score(request.aim),
         "information_bits": expected.information_bits,
         "simulated_tests": expected.tests,
-        "parameters": {name: width for name, width in widths.items() if name in (*MATERIAL, *SAMPLE)},
+        "parameters": {name: width for name, width in widths.items() if name not in CREEP},
         "creep": {
             "tension_N": expected.tension_N,
             "length_mm": expected.length_mm,
@@ -142,16 +145,17 @@ def _of_robot(machine: Robot | None) -> list[Notice]:
     return [*out, Notice("left-out", text)]
 
 
-def _drift(judged: Judged, guess: GuessedWire, machine: Robot, spec: ModelSpec) -> RobotDrift | None:
+def _drift(judged: Judged, request: PlanRequest, machine: Robot) -> RobotDrift | None:
     """How well the drift of a robot within an hour would be known, and is at the guess; None where nothing holds it."""
     after = []
     for draws in judged.expected.draws:
-        distances = _distances_mm(draws, judged.test.length_mm, machine, spec)
+        distances = _distances_mm(draws, judged.test.length_mm, machine, judged.expected.model)
         if len(distances) > 1:
             after.append([float(np.median(distances)), float(distances.std())])
     if not after:  # nothing holds the home pose
         return None
-    at_guess = _distances_mm(guess.draws, guess.length_mm, machine, spec)
+    guess = request.guess
+    at_guess = _distances_mm(guess.draws, guess.length_mm, machine, request.model)
     drift_mm, drift_sd_mm = np.median(after, axis=0)
     return {
         "time_s": HOUR_S,
@@ -161,10 +165,22 @@ def _drift(judged: Judged, guess: GuessedWire, machine: Robot, spec: ModelSpec) 
     }
 
 
-def _distances_mm(parameters: dict[str, Any], length_mm: float, machine: Robot, spec: ModelSpec) -> Floats:
+def _distances_mm(parameters: dict[str, Any], length_mm: float, machine: Robot, model: Model) -> Floats:
     """How far the platform is from its home pose after an hour, for some draws of the line; without those that fail."""
-    few = {name: parameters[name][:_ROBOT_DRAWS] for name in MATERIAL}
-    wires = robot_draws.for_robot(machine, WireDraws(few, length_mm, spec.law, spec.history))
+    names = list(MATERIAL)
+    for effect in material(model.effects):
+        names += effect.columns()
+    few = {name: parameters[name][:_ROBOT_DRAWS] for name in names}
+    line = WireDraws(
+        few,
+        length_mm,
+        model.law,
+        model.history,
+        model.effects,
+        tension_ref_N=model.tension_ref_N,
+        typical=model.typical,
+    )
+    wires = robot_draws.for_robot(machine, line)
     rotation = matrix(machine.home_rotation_rad)
     course = drift.from_command(machine, wires, machine.home_m, rotation, np.array([0.0, HOUR_S]))
     away_m = course.position_m[:, -1] - machine.home_m

@@ -19,6 +19,7 @@ from wirebayes.model.spec import ModelSpec
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Array
 from wirebayes.result_warnings import Notice
+from wirebayes.wire.model import PLAIN, Model
 from wirebayes.wire.protocol import Control
 
 
@@ -29,7 +30,7 @@ class GuessedWire:
     Attributes
     ----------
     draws : dict of name to (n,) array
-        Parameters of the plain model, those of the bench as in tests of `control`.
+        Parameters of the model, those of the bench as in tests of `control`.
     length_mm : float
         What `B` refers to.
     source : str
@@ -40,6 +41,8 @@ class GuessedWire:
         Decides the units of `sensor_sd` and `setting_sd`.
     other_benches : dict of control to dict of name to (n,) array
         Preload and errors in tests of another control, whose bench reads and sets other quantities.
+    model : Model
+        Its effects, and what these refer to.
     """
 
     draws: dict[str, Array]
@@ -48,6 +51,7 @@ class GuessedWire:
     doubts: tuple[Notice, ...] = ()
     control: Control = "displacement"
     other_benches: dict[Control, dict[str, Array]] = field(default_factory=dict)
+    model: Model = PLAIN
 
     def at(self, test: Experiment) -> dict[str, Array]:
         """The draws for the sample and the bench of a test: creep is a strain of the whole wire."""
@@ -130,7 +134,9 @@ def _middle(value: Any) -> float:
     return value if isinstance(value, float) else float(value.median())
 
 
-def from_posterior(draws: Mapping[str, Array], length_mm: float, source: str, n: int) -> GuessedWire:
+def from_posterior(
+    draws: Mapping[str, Array], length_mm: float, source: str, n: int, model: Model = PLAIN
+) -> GuessedWire:
     """Some of a posterior's draws, evenly spaced.
 
     Parameters
@@ -143,10 +149,13 @@ def from_posterior(draws: Mapping[str, Array], length_mm: float, source: str, n:
         What the guess rests on, for people.
     n : int
         How many draws; all of them where there are fewer.
+    model : Model
+        Of the posterior; the parameters of its effects are kept.
     """
     pick = evenly(len(draws["k1"]), n)
-    kept = {name: draws[name][pick] for name in (*MATERIAL, *SAMPLE)}
-    return GuessedWire(kept, length_mm, source)
+    of_effects = [column for effect in model.effects for column in effect.columns()]
+    kept = {name: draws[name][pick] for name in (*MATERIAL, *SAMPLE, *of_effects)}
+    return GuessedWire(kept, length_mm, source, model=model)
 
 
 def from_readings(experiment: Experiment, n: int, rng: Generator, spec: ModelSpec) -> GuessedWire:

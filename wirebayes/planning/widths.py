@@ -6,7 +6,7 @@ include the curvature of the posterior and the priors of a fit; a second mode fa
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
@@ -21,14 +21,15 @@ from wirebayes.model.problem import Problem
 from wirebayes.model.replicate import readings
 from wirebayes.model.sample import MATERIAL
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
-from wirebayes.numeric.frozen import frozen
 from wirebayes.numeric.typing import Array, Indices
+from wirebayes.planning.guessed_test import Guess, as_guessed, middle_tension
 from wirebayes.results.parameters import unit_of
+from wirebayes.wire.effect import Effect
 from wirebayes.wire.fresh import FreshSample
-from wirebayes.wire.staircase import simulate
+from wirebayes.wire.model import PLAIN, Model
 
-Guess = Mapping[str, Array]
 HOUR_S = 3600.0
+CREEP = ("creep_longest_hold_mm", "creep_1h_mm")
 _DRAWS = (500, 500, 3000)  # of each posterior, round by round: the last give its width to some 5 %, tails included
 _ROWS = 16  # simulated tests weighted at once
 _KEPT = 400  # draws that are handed on of a posterior
@@ -55,6 +56,8 @@ class Expected:
         (as logarithms) may lie in is halved, from the model's prior to the posterior; median over the tests.
     tests : int
         Simulated tests that could be used.
+    model : Model
+        The wire's, which the parameters belong to.
     draws : tuple of dict of name to (k,) array
         Equally weighted posterior draws of the first few simulated tests.
     """
@@ -65,38 +68,8 @@ class Expected:
     longest_hold_s: float
     information_bits: float
     tests: int
+    model: Model
     draws: tuple[dict[str, Array], ...]
-
-
-def central(guess: Guess) -> dict[str, float]:
-    """The median of each parameter."""
-    return {name: float(np.median(values)) for name, values in guess.items()}
-
-
-def at_centre(test: Experiment, guess: Guess, spec: ModelSpec) -> Experiment:
-    """The test with the readings, tensions or displacements, that the guess's centre gives without errors.
-
-    Parameters
-    ----------
-    test : Experiment
-        The planned test; the readings that it holds are replaced.
-    """
-    problem = build([test], (), spec)
-    (sample,) = problem.samples
-    centre = {name: np.array([value]) for name, value in central(guess).items()}
-    read = simulate(sample.protocol, centre, sample.model)[..., 0]
-    holds = []
-    for hold, row, mask in zip(test.holds, read, sample.protocol.mask, strict=True):
-        if hold.recorded:
-            hold = replace(hold, readings=frozen(row[mask].tolist()))
-        holds.append(hold)
-    return replace(test, holds=tuple(holds))
-
-
-def middle_tension(test: Experiment) -> float:
-    """The middle one of the tensions with which the holds of a test begin, N."""
-    first = [np.ravel(hold.tension_N)[0] for hold in test.recorded_holds]
-    return float(np.median(first))
 
 
 def expected_widths(
@@ -105,6 +78,7 @@ def expected_widths(
     rng: Generator,
     spec: ModelSpec = PLAIN_SPEC,
     *,
+    guessed: Model = PLAIN,
     tension_N: float | None = None,
     length_mm: float | None = None,
     kept_draws: int = 0,
@@ -116,8 +90,10 @@ def expected_widths(
     test : Experiment
         What is planned, with the readings of `at_centre`; its priors are those of the later fit.
     guess : mapping of name to (n,) array
-        Draws of the plain model's parameters; ``n`` tests are simulated.
+        Draws of the parameters; ``n`` tests are simulated.
     rng : numpy Generator
+    guessed : Model
+        Of the guess: tests are simulated and fitted with its effects.
     tension_N, length_mm : float, optional
         For which creep is stated, so that tests of several lengths can be compared (creep is a strain of the whole
         wire); this test's `middle_tension` and length when left out.
@@ -129,16 +105,17 @@ def expected_widths(
     ValueError
         If no simulated test has a posterior that can be climbed.
     """
-    natural = build([test], (), spec)
+    natural = build([test], guessed.effects, spec)
     problem = natural.in_units(natural.own_units)  # so that nothing depends on what is called a newton
+    of_guess = as_guessed(natural, guessed).in_units(natural.own_units)
     creep = _Creep(
         tension_N=middle_tension(test) if tension_N is None else tension_N,
         length_mm=test.length_mm if length_mm is None else length_mm,
         longest_s=float(natural.samples[0].protocol.duration_s.max()),
     )
     target = LogPosterior(problem)
-    guessed = np.column_stack([guess[name] for name in natural.names])
-    truth, y = _simulated(problem, natural.theta_in(problem.units, guessed), rng)
+    columns = np.column_stack([guess[name] for name in natural.names])
+    truth, y = _simulated(of_guess, natural.theta_in(problem.units, columns), rng)
     found, good = _climbed(target, truth, y)
     widths = list[dict[str, Array]]()
     volumes = list[Array]()
@@ -153,12 +130,13 @@ def expected_widths(
         draws += _kept(part, values, kept_draws - len(draws), rng)
     before = _quantities(natural, problem.theta_in(natural.units, truth), creep)
     return Expected(
-        _expected(widths, before, test),
+        _expected(widths, before, test, guessed.effects),
         creep.tension_N,
         creep.length_mm,
         creep.longest_s,
         _bits(problem, np.concatenate(volumes)),
         len(good),
+        natural.samples[0].model,
         tuple(draws),
     )
 
@@ -206,12 +184,14 @@ def _kept(part: _Posteriors, values: dict[str, Array], count: int, rng: Generato
     return out
 
 
-def _expected(widths: list[dict[str, Array]], before: dict[str, Array], test: Experiment) -> dict[str, ExpectedWidth]:
+def _expected(
+    widths: list[dict[str, Array]], before: dict[str, Array], test: Experiment, effects: tuple[Effect, ...]
+) -> dict[str, ExpectedWidth]:
     """Each quantity's width over all simulated tests, and before them."""
     out = {}
     for name in widths[0]:
         after = np.concatenate([part[name] for part in widths])
-        out[name] = _width(after, before[name], _unit(name, test))
+        out[name] = _width(after, before[name], _unit(name, test, effects))
     return out
 
 
@@ -323,12 +303,11 @@ def _quantities(problem: Problem, theta: Array, creep: _Creep) -> dict[str, Arra
     (sample,) = problem.samples
     tested_mm = sample.protocol.length_mm
     own = problem.parameters(theta, sample)
-    material = {name: own[name] for name in MATERIAL}
-    wire = FreshSample(material, sample.model, tested_mm)
+    wire = FreshSample(own, sample.model, tested_mm)
     times = np.array([creep.longest_s, HOUR_S])
     longest_hold, hour = wire.creep_mm(creep.tension_N, times) * (creep.length_mm / tested_mm)
     free = {name: theta[:, i] for i, name in enumerate(problem.names)}
-    return free | {"creep_longest_hold_mm": longest_hold, "creep_1h_mm": hour}
+    return free | dict(zip(CREEP, (longest_hold, hour), strict=True))
 
 
 def _row_widths(values: Array, weight: Array) -> Array:
@@ -358,8 +337,8 @@ def _log_volume(part: _Posteriors, problem: Problem) -> Array:
     return 0.5 * log_determinant
 
 
-def _unit(name: str, test: Experiment) -> str:
-    return "mm" if name.startswith("creep_") else unit_of(name, controls=(test.control,))
+def _unit(name: str, test: Experiment, effects: tuple[Effect, ...]) -> str:
+    return "mm" if name in CREEP else unit_of(name, effects, (test.control,))
 
 
 def _width(rows: Array, before: Array, unit: str) -> ExpectedWidth:
