@@ -79,7 +79,7 @@ STUDIES = {
     ),
     "discover_hidden": (
         "-m analyses.hidden_effects --size small --answer api --simulations 199 --judge-draws 40 --kinds single "
-        "without foreign two three mixed periodic --seed 7306 7307 7308 7311 --protocols paper unloading "
+        "without foreign two three mixed periodic --seed 7406 7407 7408 7411 --protocols paper unloading "
         "uneven dense temperature slack --output {folder}",
         "scores.json",
     ),
