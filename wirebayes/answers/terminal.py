@@ -1,6 +1,6 @@
 """The answer of every result in a few lines, with units: on a terminal, and in Python with `print`."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Literal
 
 from wirebayes.answers.creep import creep_as_long_as_held, lengths_in_words
@@ -21,6 +21,7 @@ from wirebayes.json_files.plan import JudgedProtocol
 from wirebayes.json_files.read_units import error_grows, read_value, unit_read
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.json_files.values import Quantiles
+from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.result_warnings import warns_of
 from wirebayes.sentences import (
     counted,
@@ -349,17 +350,35 @@ def options_of_best(table: ComparedModels) -> str | None:
     effects = best.get("effects", [])
     if not all(what_it_is(effect) for effect in effects):
         return None
-    options = [f"--effect {effect}" for effect in effects]
-    for key in _CHOICES:
-        if best[key] != base[key]:
-            option = key.replace("_", "-")
-            options.append(f"--{option} {best[key]}")
-    if not options and best is not base:
+    is_of_options = bool(effects) or any(best[key] != base[key] for key in _USUAL)
+    if best is not base and not is_of_options:
         return None
-    return " ".join(options)
+    options = [f"--effect {effect}" for effect in effects]
+    return " ".join([*options, *_unusual(best, _USUAL)])
 
 
-_CHOICES: tuple[Literal["elastic_law", "history", "likelihood"], ...] = ("elastic_law", "history", "likelihood")
+def options_of_base(table: ComparedModels) -> str:
+    """What `wirebayes discover` needs to search beside the model that all are compared with, after a space."""
+    base = next(row for row in table["models"] if row["name"] == table["base"])
+    return "".join(f" {option}" for option in _unusual(base, ("elastic_law", "history")))
+
+
+_Choice = Literal["elastic_law", "history", "likelihood"]
+_USUAL: dict[_Choice, str] = {
+    "elastic_law": PLAIN_SPEC.law,
+    "history": PLAIN_SPEC.history,
+    "likelihood": PLAIN_SPEC.likelihood,
+}
+
+
+def _unusual(row: ComparedModel, choices: Iterable[_Choice]) -> list[str]:
+    """The options of a model that commands do not take by themselves."""
+    options = []
+    for key in choices:
+        if row[key] != _USUAL[key]:
+            option = key.replace("_", "-")
+            options.append(f"--{option} {row[key]}")
+    return options
 
 
 def _with_unit(quantity: Parameter | ParameterRange) -> str:

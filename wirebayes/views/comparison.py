@@ -27,7 +27,7 @@ class Comparison(Result[ComparisonJson]):
     def next_step(self, given: Given = NOTHING) -> str:
         tables = list(self.summary()["experiments"].values())
         options = terminal.options_of_best(tables[0]) if len(tables) == 1 else None
-        discover = f"wirebayes discover {given.file}"
+        discover = f"wirebayes discover {given.file}{terminal.options_of_base(tables[0])}"
         return discover if options is None else f"{f'wirebayes fit {given.file} {options}'.rstrip()}\n{discover}"
 
     def _short_form(self) -> list[str]:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.answers.headline import comparison_in_words
-from wirebayes.answers.terminal import options_of_best
+from wirebayes.answers.terminal import options_of_base, options_of_best
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.comparison import ComparedModel, ComparedModels, ComparisonJson
 from wirebayes.json_files.read_units import read_value, unit_read
@@ -100,7 +100,8 @@ def _next(table: ComparedModels) -> str:
     again = ""
     if options is not None:
         again = f"wirebayes fit {options}".rstrip() + " or "
-    return f"Next: {again}wirebayes discover, with the same file; discover names what is missing."
+    discover = f"wirebayes discover{options_of_base(table)}"
+    return f"Next: {again}{discover}, with the same file; discover names what is missing."
 
 
 def _scores(scored: Sequence[ComparedModel], base: str) -> Table:
