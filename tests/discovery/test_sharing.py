@@ -14,8 +14,10 @@ from wirebayes.effects.instrument import ScrewError
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
+from wirebayes.model.build import build
 from wirebayes.model.scales import scales_of
 from wirebayes.model.spec import PLAIN_SPEC
+from wirebayes.results.posterior_checks import _columns_of
 from wirebayes.simulation.synthetic import Bench, Truth, write_tests
 
 WIRE = {"U": 0.6, "B": 0.08, "k2": 0.02, "N": 0.7, "preload": 0.5, "sensor_sd": 0.01, "setting_sd": 0.01}
@@ -47,6 +49,20 @@ def test_each_material_knows_what_a_fit_of_all_at_once_knows(tmp_path: Path, nam
     for own_mean, own_sd in after:
         assert own_mean == pytest.approx(mean, abs=0.2 * sd)
         assert own_sd == pytest.approx(sd, rel=0.1)
+
+
+def test_what_other_materials_say_is_no_prior_that_somebody_may_state(tmp_path: Path) -> None:
+    benches = [Bench(name=f"on-{m}", material=m) for m in ("soft", "stiff")]
+    drift = effect_named("sensor_drift")
+    stiffness = {"k1[soft]": 700.0, "k1[stiff]": 2500.0, "sensor_drift.a": 4e-5}
+    write_tests(tmp_path, benches, Truth(WIRE | stiffness, [drift]), 0)
+    alone = [fit([e], "sensor_drift") for e in read_experiments(tmp_path / "experiments.toml")]
+    shared = informed(alone, dict.fromkeys((0, 1), drift), np.random.default_rng(1))
+    for block, asked in ((alone[0], True), (shared[0], False)):
+        problem = build(block.experiments, block.effects, block.spec, scales=block.scales)
+        columns = _columns_of(problem, problem.samples[0])
+        assert ("sensor_drift.a" in columns) == asked
+        assert {"k1", "B", "U", "k2", "N"} <= set(columns)
 
 
 def test_what_is_hardly_known_of_a_one_sided_amplitude_is_not_handed_on() -> None:

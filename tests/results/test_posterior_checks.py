@@ -11,6 +11,9 @@ from wirebayes.inference.policy import Policy
 from wirebayes.io.run_folder import read_json
 from wirebayes.model.build import FINEST, build
 from wirebayes.model.problem import with_readings
+from wirebayes.model.sample import LENGTH_EXPONENT
+from wirebayes.model.spec import ModelSpec
+from wirebayes.numeric.distributions import Normal
 from wirebayes.report.pages.fit import _cautions
 from wirebayes.results import posterior_checks, store
 from wirebayes.simulation.synthetic import Bench, Truth, draw
@@ -244,3 +247,29 @@ def test_a_stated_preload_that_leaves_a_pulling_wire_slack_is_the_first_to_be_sa
     problem = build([experiment])
     found = posterior_checks.posterior_warnings(fit_problem(problem, 1, policy=HASTY), problem.samples[0])
     assert "(preload_mm) leaves the wire slack in holds 1, 2, 3 and 4" in found[0].text
+
+
+@pytest.mark.parametrize(
+    ("lengths", "exponent", "said"),
+    [
+        ((1000.0, 2000.0), 1.6, "1.5 times as much as the shortest"),
+        ((2000.0, 1000.0), 0.5, "0.71 times as much as the shortest"),
+        ((1000.0, 2000.0), 1.05, ""),
+        ((1000.0, 2000.0, 2000.0), 1.6, ""),  # two of one length show whether samples differ
+        ((1000.0, 1000.0), None, ""),
+    ],
+)
+def test_one_sample_of_each_length_does_not_tell_a_power_of_the_length_from_samples_that_differ(
+    lengths, exponent, said
+):
+    experiments = []
+    for length in lengths:
+        bench = Bench(name=f"w{len(experiments)}", length_mm=length)
+        experiments.append(bench.experiment())
+    problem = build(experiments, [], ModelSpec(length_exponent=Normal(1.0, 1.0)))
+    theta = np.ones((500, len(problem.names)))
+    if exponent is not None:
+        theta[:, problem.names.index(LENGTH_EXPONENT)] = np.random.default_rng(0).normal(exponent, 0.05, 500)
+    notices = posterior_checks.of_lengths(problem, theta)
+    assert [notice.kind for notice in notices] == ["extrapolation"] * bool(said)
+    assert all(said in notice.text for notice in notices)

@@ -48,7 +48,8 @@ def _priors(effect: Effect, others: Sequence[tuple[LaplaceFit, Effect]]) -> dict
 
 def _with_priors(block: LaplaceFit, priors: dict[str, dict[str, Any]], rng: np.random.Generator) -> LaplaceFit:
     """The block refitted with priors in its experiments."""
-    experiments = [replace(e, priors=e.priors | priors) for e in block.experiments]
+    told = frozenset(priors)
+    experiments = [replace(e, priors=e.priors | priors, told=e.told | told) for e in block.experiments]
     near = block.theta[0]
     return fitted(experiments, block.effects, block.spec, rng, near, scales=block.scales)
 

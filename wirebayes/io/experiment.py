@@ -48,6 +48,8 @@ class Experiment:
         What was set in each hold; the other was read.
     preload_mm : float, optional
         The stretch at displacement zero, where it is known.
+    told : frozenset of str
+        Parameters whose prior is what readings of other materials say of them, and nothing that was stated.
 
     Examples
     --------
@@ -65,6 +67,7 @@ class Experiment:
     prior_lines: dict[str, int] = field(default_factory=dict)
     control: Control = "displacement"
     preload_mm: float | None = None
+    told: frozenset[str] = frozenset()
 
     def __repr__(self) -> str:
         holds, readings = len(self.recorded_holds), sum(hold.time_s.size for hold in self.recorded_holds)

@@ -65,7 +65,7 @@ def build(
         mark = f"[{experiment.name}]" if several else ""
         distributions |= _sample_priors(experiment, effects, mark, spec, scales)
     every = _in_natural_units(distributions, effects, samples, scales)
-    stated = _apply_tables(every, experiments)
+    stated, told = _apply_tables(every, experiments)
     fixed, free = _fixed_and_free(every)
     logarithmic = _positive(free, effects)
     powers = _default_powers([name for name in free if name not in stated], fixed, scales.units)
@@ -75,6 +75,7 @@ def build(
         spec.likelihood,
         scales=scales,
         stated=frozenset(stated),
+        told=frozenset(told),
     )
 
 
@@ -252,9 +253,16 @@ def _extent(experiment: Experiment) -> float:
     return float(np.ptp(values) if experiment.control == "force" else np.abs(values).max())
 
 
-def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experiment]) -> set[str]:
-    """Put the priors of the files in place of the defaults, and return the columns that have one."""
+def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experiment]) -> tuple[set[str], set[str]]:
+    """Put stated priors in place of the defaults.
+
+    Returns
+    -------
+    set of str, set of str
+        The columns that have one, and those of them that readings of other materials tell of.
+    """
     stated = set()
+    told = set()
     for experiment in experiments:
         marks = experiment.name, experiment.material, experiment.control
         for name, table in experiment.priors.items():
@@ -265,4 +273,6 @@ def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experimen
             if column is not None:
                 distributions[column] = wanted
                 stated.add(column)
-    return stated
+                if name in experiment.told:
+                    told.add(column)
+    return stated, told

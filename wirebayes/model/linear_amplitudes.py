@@ -244,6 +244,7 @@ def integrated(problem: Problem) -> Problem:
         scales=problem.scales,
         units=problem.units,
         stated=problem.stated,
+        told=problem.told,
         whole=problem,
         columns=tuple(np.array(gone)[shows]),
         shapes=tuple(shape[..., shows] for shape in shapes),

@@ -41,6 +41,8 @@ class Problem:
         In which parameters, protocols and readings are written.
     stated : frozenset of str
         Parameters whose prior a person stated, in natural units.
+    told : frozenset of str
+        Those of them whose prior is what readings of other materials say.
     """
 
     samples: tuple[Sample, ...]
@@ -49,6 +51,7 @@ class Problem:
     scales: Scales | None = None
     units: Units = NATURAL
     stated: frozenset[str] = frozenset()
+    told: frozenset[str] = frozenset()
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from wirebayes.io.slack_by_preload import slack_by_preload
 from wirebayes.io.zero_shifts import slack_below
 from wirebayes.model.build import FINEST
 from wirebayes.model.problem import Problem
-from wirebayes.model.sample import Sample
+from wirebayes.model.sample import LENGTH_EXPONENT, Sample
 from wirebayes.numeric.typing import Floats
 from wirebayes.result_warnings import Notice
 from wirebayes.results.prior_influence import leaning
@@ -34,6 +34,7 @@ _TENTH, _NINE_TENTHS = np.log(10.0 / 9.0), np.log(10.0)  # of the creep is reach
 _CENTURY_S = 100 * 365.25 * 86400  # beyond it seconds say nothing
 _DECADES_TIMES_N = float(np.log10(_NINE_TENTHS / _TENTH))
 NEAR, OFTEN = 2.0, 0.1  # setting errors from slack, and the share of draws in which a taut hold comes so near it
+APART = 0.01  # share of the draws of an exponent of the length that lie on both sides of what a strain has, together
 LEAST_SHRINKAGE = 0.1  # share by which the widest-moved parameter's interval shrank; below it the prior is returned
 
 
@@ -79,6 +80,33 @@ def copied_samples(samples: Iterable[Sample]) -> dict[str, list[Notice]]:
     return data_checks.copied_tests(tests)
 
 
+def of_lengths(problem: Problem, theta: Floats) -> list[Notice]:
+    """What one sample of each length cannot show: whether creep follows the length, or the samples differ.
+
+    Parameters
+    ----------
+    theta : (n, d) array
+        Draws of the posterior, in the problem's columns.
+    """
+    lengths = [sample.protocol.length_mm for sample in problem.samples]
+    if LENGTH_EXPONENT not in problem.names or len(set(lengths)) < len(lengths):
+        return []
+    exponent = theta[:, problem.names.index(LENGTH_EXPONENT)]
+    least, low, middle, high, most = np.quantile(exponent, [0.5 * APART, 0.05, 0.5, 0.95, 1.0 - 0.5 * APART])
+    if least <= 1.0 <= most:
+        return []
+    times = (max(lengths) / min(lengths)) ** (middle - 1.0)
+    power = f"{short(middle, 2)} [{short(low, 2)}, {short(high, 2)}]"
+    return [
+        Notice(
+            "extrapolation",
+            f"creep grows as the length to the power {power}, by one sample of each length: if instead the longest "
+            f"sample creeps {short(times, 2)} times as much as the shortest at any length, the readings look the same, "
+            "and creep computed for other lengths is wrong; test two samples of one length",
+        )
+    ]
+
+
 def _columns_of(problem: Problem, sample: Sample) -> list[str]:
     """The columns of a sample of which somebody may know something to state."""
     control = sample.protocol.control
@@ -87,7 +115,8 @@ def _columns_of(problem: Problem, sample: Sample) -> list[str]:
     columns = []
     for name in problem.names:
         is_latent = name.startswith(f"{Discrepancy.name}.")  # values of a smooth curve
-        if not is_latent and _belongs(name, sample, shared=is_first, of_instrument=sample is first_read_so):
+        is_open = not is_latent and name not in problem.told
+        if is_open and _belongs(name, sample, shared=is_first, of_instrument=sample is first_read_so):
             columns.append(name)
     return columns
 

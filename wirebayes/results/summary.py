@@ -68,6 +68,7 @@ def _warnings(fit: Fit, sample: Sample | None, ends: HoldEnds | None) -> list[No
         for one in fit.problem.samples:
             own = [*copied.get(one.name, ()), *posterior_checks.posterior_warnings(fit, one)]
             found += [notice.of(one.name) for notice in own]
+        found += posterior_checks.of_lengths(fit.problem, fit.flat)
     return to_json([*found, *hold_ends.hold_ends_notice(ends)])
 
 
