@@ -5,6 +5,7 @@ beside a flexible reference; further effects by leave-one-hold-out; the gap on h
 detected.
 """
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -16,7 +17,7 @@ from numpy.random import Generator
 from wirebayes.discovery import gross_errors, power, residual_patterns, shrinking
 from wirebayes.discovery.alternatives import Alternative, alternatives
 from wirebayes.discovery.apart import p_alike
-from wirebayes.discovery.doubts import likely_beside, samples_differ
+from wirebayes.discovery.doubts import lengths_or_samples, likely_beside, samples_differ
 from wirebayes.discovery.families import block_ratio, called, family_names, family_sentence
 from wirebayes.discovery.global_test import Gate, examine
 from wirebayes.discovery.held_out import LeftOut
@@ -197,10 +198,15 @@ def _own_reports(
 
 
 def _differing_samples(final: Sequence[LaplaceFit], seed: int, parallel_map: ParallelMap) -> list[list[Notice]]:
-    """What is said of each material whose samples differ."""
+    """What is said of each material whose samples differ, or may do so."""
     each = np.random.default_rng(seed_of(seed, "samples")).spawn(len(final))
     found = parallel_map(p_alike, final, each)
-    return [samples_differ(p, block.names) for p, block in zip(found, final, strict=True)]
+    in_blocks = Counter(effect.name for block in final for effect in block.effects)
+    said = []
+    for p, block in zip(found, final, strict=True):
+        of_one = [effect for effect in block.effects if in_blocks[effect.name] == 1]
+        said.append([*samples_differ(p, block.names), *lengths_or_samples(of_one, block.experiments)])
+    return said
 
 
 def _with_doubts(found: ExperimentFindings, of_samples: Sequence[Notice]) -> ExperimentFindings:
