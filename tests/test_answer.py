@@ -178,29 +178,6 @@ def test_a_comparison_says_errors_with_units_and_the_command_of_the_best_model(t
 
 
 @pytest.mark.parametrize(
-    ("base", "best", "next_"),
-    [
-        (("modified", "additive", "chain"), {"history": "saturating"}, "fit w.toml --elastic-law modified"),
-        (("modified", "saturating", "chain"), {"elastic_law": "hooke"}, "fit w.toml"),
-        (("modified", "saturating", "chain"), {}, ""),  # a law of time that fit has no option for
-        (("hooke", "additive", "hold"), None, "fit w.toml --history additive --likelihood hold"),
-    ],
-)
-def test_the_next_step_is_the_best_model_also_where_another_than_the_usual_one_was_compared(
-    tmp_path: Path, base: tuple[str, str, str], best: dict[str, str] | None, next_: str
-) -> None:
-    law, history, likelihood = base
-    plain = {"name": "plain", "elastic_law": law, "history": history, "likelihood": likelihood}
-    plain |= {"failed": None, "effects": []}
-    models = [plain] if best is None else [plain | {"name": "best"} | best, plain]
-    content = {"experiments": {"w": {"base": "plain", "models": models}}}
-    *fits, discover = stored(Comparison, tmp_path, "comparison.json", content).next_step(Given("w.toml")).splitlines()
-    assert fits == ([f"wirebayes {next_}"] if next_ else [])
-    searched = [f"--elastic-law {law}"] * (law != "hooke") + [f"--history {history}"] * (history != "saturating")
-    assert discover == " ".join(["wirebayes discover w.toml", *searched])
-
-
-@pytest.mark.parametrize(
     ("elpd", "then", "next_"),
     [
         (7.6, ", which may be chance; then plain", "fit w.toml"),

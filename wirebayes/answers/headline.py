@@ -8,9 +8,11 @@ from wirebayes.answers.creep import creep_as_long_as_held, lengths_in_words
 from wirebayes.answers.robot import stays_in_words
 from wirebayes.answers.terminal import MOST_OUTLIERS, missing_in
 from wirebayes.answers.verdict import (
+    better_beside,
     control_judged,
     is_more_than_chance,
     median_between,
+    models_ranked,
     verdict_in_words,
     what_it_is,
 )
@@ -182,7 +184,7 @@ def comparison_in_words(name: str, table: ComparedModels) -> str:
     table : dict
         Its part of ``comparison.json``.
     """
-    scored = [row for row in table["models"] if row["failed"] is None]
+    scored = models_ranked(table)
     if not scored:
         return f"{name}: no model could be judged."
     best, *others = scored
@@ -204,6 +206,8 @@ def comparison_in_words(name: str, table: ComparedModels) -> str:
         names = [spoken(row["name"]) for row in others]
         behind = some_of(names, 3)
         text += f"; then {come} {behind}"
+    for sentence in better_beside(table):
+        text += f". {sentence[0].upper()}{sentence[1:]}"
     return f"{text}."
 
 

@@ -6,9 +6,11 @@ from typing import Literal
 from wirebayes.answers.creep import creep_as_long_as_held, lengths_in_words
 from wirebayes.answers.holds_table import holds_table
 from wirebayes.answers.verdict import (
+    better_beside,
     control_judged,
     lead_may_be_chance,
     median_between,
+    models_ranked,
     verdict_in_words,
     what_it_is,
 )
@@ -313,7 +315,7 @@ def _list(title: str, items: list[str]) -> list[str]:
 
 def of_comparison(name: str, table: ComparedModels) -> list[str]:
     """Lines about one experiment: the models that best predict what they have not seen, and with which error."""
-    rows = [row for row in table["models"] if row["failed"] is None]
+    rows = models_ranked(table)
     if not rows:
         return [f"{name}: no model could be judged"]
     shown, rest = rows[:3], rows[3:]
@@ -324,7 +326,9 @@ def of_comparison(name: str, table: ComparedModels) -> list[str]:
     shown += [row for row in rest if row["name"] == table["base"]]
     errors = [_error_ahead(row) for row in shown]
     scored = [error for error in errors if error]
-    return [f"{name}: {best} predicts left-out holds best{then}", *_list("rms error on the last holds", scored)]
+    beside = [f"  {sentence}" for sentence in better_beside(table)]
+    first = f"{name}: {best} predicts left-out holds best{then}"
+    return [first, *_list("rms error on the last holds", scored), *beside]
 
 
 def _error_ahead(row: ComparedModel) -> str:

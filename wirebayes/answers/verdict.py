@@ -1,10 +1,10 @@
 """A verdict in words, and what an effect is."""
 
 from wirebayes.effects import CATALOGUE
-from wirebayes.json_files.comparison import ComparedModels, Difference
+from wirebayes.json_files.comparison import ComparedModel, ComparedModels, Difference
 from wirebayes.json_files.discovery import AmplitudeEstimate, ExperimentFindings
 from wirebayes.json_files.read_units import unit_read
-from wirebayes.sentences import likely
+from wirebayes.sentences import likely, short, spoken
 from wirebayes.wire.protocol import Control
 
 _NAMED = {
@@ -46,6 +46,30 @@ def what_it_is(effect: str, control: Control = "displacement") -> str:
         return ""
     first = kind.sentence_under(control).split(". ")[0].rstrip(".")
     return first[:1].lower() + first[1:]
+
+
+def models_ranked(table: ComparedModels) -> list[ComparedModel]:
+    """The models that can be ranked, best first: those that are scored on the same readings."""
+    rows = [row for row in table["models"] if row["failed"] is None]
+    return [row for row in rows if row.get("scored") == rows[0].get("scored")]
+
+
+def better_beside(table: ComparedModels) -> list[str]:
+    """Sentences on models that cannot be ranked, and predict better where the same readings compare them."""
+    names = [row["name"] for row in models_ranked(table)]
+    out = []
+    for row in table["models"]:
+        gain = row.get("given_first_difference")
+        known = gain is not None and gain["se"] is not None  # of one hold there is no error
+        if row["name"] in names or not gain or not known:
+            continue
+        if gain["elpd"] > 0 and is_more_than_chance(gain):
+            size = f"{short(gain['elpd'], 2)} ± {short(gain['se'], 2)}"
+            out.append(
+                f"{spoken(row['name'])} is scored on other readings and not ranked; given the first reading of each of "
+                f"the last holds it predicts better than {spoken(table['base'])}, by {size} elpd"
+            )
+    return out
 
 
 def lead_may_be_chance(table: ComparedModels) -> bool:
