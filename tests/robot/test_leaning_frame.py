@@ -13,7 +13,7 @@ from wirebayes.robot.self_calibration.another_weight import OtherMass
 from wirebayes.robot.self_calibration.equations import Noise, State
 from wirebayes.robot.self_calibration.estimate import estimate
 from wirebayes.robot.self_calibration.holds_creep import creep_of
-from wirebayes.robot.self_calibration.leaning_frame import LeaningFrame, _Lean
+from wirebayes.robot.self_calibration.leaning_frame import Lean, LeaningFrame
 from wirebayes.robot.self_calibration.linearisation import linearised
 from wirebayes.robot.self_calibration.one_cause import explained_by
 from wirebayes.robot.self_calibration.posterior import RobotPosterior
@@ -74,12 +74,12 @@ def test_residuals_follow_a_lean_as_its_slopes_say(name):
     noise = Noise(1e-3, 1e-3, 1.0, 1.0, 1e-3)
     found = _about(unknowns, holds, noise, state)
     by = np.array([2e-6, -3e-6])
-    ahead = _about(*_put(_Lean().changed(found, holds, by), noise))
+    ahead = _about(*_put(Lean().changed(found, holds, by), noise))
     back = rotation.matrix(np.append(-by, 0.0))
     balance = found.equations.rows["balance"]
     seen = ahead.equations.residual
     seen[:, balance] = (seen[:, balance].reshape(3, -1, 3) @ back.T).reshape(3, -1)
-    foreseen = found.equations.residual + _Lean().slopes(found) @ by
+    foreseen = found.equations.residual + Lean().slopes(found) @ by
     np.testing.assert_allclose(seen[:, balance], foreseen[:, balance], atol=1e-6 * abs(foreseen[:, balance]).max())
     loop = found.equations.rows["loop"]
     np.testing.assert_allclose(seen[:, loop], foreseen[:, loop], rtol=1e-9)
@@ -116,7 +116,7 @@ def test_the_error_of_the_loops_stays_as_it_was_found_so_that_likelihoods_compar
     found = estimate(unknowns, holds, start)
     fitted = []
 
-    class Recorded(_Lean):
+    class Recorded(Lean):
         def changed(self, found, holds, by):
             fitted.append(found.unknowns.errors.joint_m)
             return super().changed(found, holds, by)

@@ -59,7 +59,7 @@ def other_centre(found: RobotPosterior, holds: Holds, progress: ShareDone = lamb
     robot = found.unknowns.robot
     if robot.degrees == 3:
         return None
-    cause = _Centre(robot.size_m)
+    cause = Centre(robot.size_m)
     explained = explained_by(cause, found, holds, progress)
     if explained is None:
         return None
@@ -69,7 +69,7 @@ def other_centre(found: RobotPosterior, holds: Holds, progress: ShareDone = lamb
 
 
 @dataclass(frozen=True)
-class _Centre:
+class Centre:
     """The centre of mass, m; no heavy part of a platform is much farther out than its points."""
 
     usual: float
@@ -82,6 +82,15 @@ class _Centre:
         return by_carried(found.equations, robot, found.noise, np.stack(there) - here)
 
     def changed(self, found: RobotPosterior, holds: Holds, by: Floats) -> tuple[Unknowns, Holds, State]:
+        """What is fitted with another value, and from where: `one_cause.Cause.changed`.
+
+        Parameters
+        ----------
+        found : RobotPosterior
+        holds : Holds
+        by : (3,) array
+            Further in the platform's frame, m.
+        """
         robot = found.unknowns.robot
         other = replace(robot, centre_of_mass_m=robot.centre_of_mass_m + by)
         return replace(found.unknowns, robot=other), holds, found.state

@@ -51,7 +51,7 @@ def other_mass(found: RobotPosterior, holds: Holds, progress: ShareDone = lambda
     holds : Holds
     progress : function of a share between 0 and 1
     """
-    explained = explained_by(_Mass(), found, holds, progress)
+    explained = explained_by(Mass(), found, holds, progress)
     if explained is None:
         return None
     mass = explained.found.unknowns.robot.mass_kg
@@ -59,7 +59,7 @@ def other_mass(found: RobotPosterior, holds: Holds, progress: ShareDone = lambda
     return OtherMass(mass, sd, found.unknowns.robot.mass_kg, explained.found.evidence)
 
 
-class _Mass:
+class Mass:
     """The platform's mass; its value is the relative change."""
 
     usual = 1.0
@@ -70,6 +70,15 @@ class _Mass:
         return by_carried(found.equations, robot, found.noise, weight[None])
 
     def changed(self, found: RobotPosterior, holds: Holds, by: Floats) -> tuple[Unknowns, Holds, State]:
+        """What is fitted with another value, and from where: `one_cause.Cause.changed`.
+
+        Parameters
+        ----------
+        found : RobotPosterior
+        holds : Holds
+        by : (1,) array
+            Relative change of the mass.
+        """
         robot = found.unknowns.robot
         heavier = replace(robot, mass_kg=robot.mass_kg * max(1.0 + float(by[0]), _LEAST))
         return replace(found.unknowns, robot=heavier), holds, found.state

@@ -55,8 +55,18 @@ def fault_notices(explain: Sequence[Explanation], sensors: Suspects | None) -> l
     if not explain:
         return sensor_notices(sensors)
     named = [(one.evidence, [Notice("misfit", one.in_words())]) for one in explain]
-    if sensors is not None and sensors.wires and sensors.whole[sensors.wires].all():
+    if sensors is not None and sensors_explain(sensors):
         named.append((float(sensors.evidence[sensors.wires].max()), sensor_notices(sensors)))
     likeliest = max(evidence for evidence, _ in named)
     least = likeliest + np.log(SIGNIFICANT)
     return [notice for evidence, notices in named if evidence > least for notice in notices]
+
+
+def sensors_explain(sensors: Suspects | None) -> bool:
+    """Whether any sensor that is named would alone explain all that contradicts.
+
+    Parameters
+    ----------
+    sensors : Suspects or None
+    """
+    return sensors is not None and bool(sensors.wires) and bool(sensors.whole[sensors.wires].all())

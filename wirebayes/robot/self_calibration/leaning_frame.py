@@ -60,7 +60,7 @@ def leaning_frame(found: RobotPosterior, holds: Holds, progress: ShareDone = lam
     holds : Holds
     progress : function of a share between 0 and 1
     """
-    explained = explained_by(_Lean(), found, holds, progress)
+    explained = explained_by(Lean(), found, holds, progress)
     if explained is None:
         return None
     turn = _home(explained.found.unknowns.robot) @ _home(found.unknowns.robot).T
@@ -70,7 +70,7 @@ def leaning_frame(found: RobotPosterior, holds: Holds, progress: ShareDone = lam
     return LeaningFrame(-turn[2], angle, sd, explained.found.evidence)
 
 
-class _Lean:
+class Lean:
     """A turn of the robot about the world's x and y axes, rad."""
 
     usual = 0.1  # of a frame, a table or a ceiling
@@ -84,6 +84,15 @@ class _Lean:
         return by_carried(found.equations, robot, found.noise, np.stack(wrench))
 
     def changed(self, found: RobotPosterior, holds: Holds, by: Floats) -> tuple[Unknowns, Holds, State]:
+        """What is fitted with another value, and from where: `one_cause.Cause.changed`.
+
+        Parameters
+        ----------
+        found : RobotPosterior
+        holds : Holds
+        by : (2,) array
+            Turn about x and y, rad.
+        """
         turn = matrix(np.append(by, 0.0))
         unknowns = found.unknowns
         session = holds.session

@@ -24,8 +24,8 @@ class Cause(Protocol):
     """One or several values that are exact in a calibration, and may be wrong."""
 
     @property
-    def usual(self) -> float:
-        """Standard deviation of each value before anything was read."""
+    def usual(self) -> float | Floats:
+        """Standard deviation of each value before anything was read; one of all that is alike, or ``(c,)``."""
 
     def slopes(self, found: RobotPosterior) -> Floats:
         """How the residuals ``(p, k, c)`` follow a change of the values."""
@@ -44,10 +44,20 @@ class Cause(Protocol):
 
 @dataclass(frozen=True)
 class Explained:
-    """A posterior in which nothing contradicts, and the covariance ``(c, c)`` of the values that it takes."""
+    """A posterior in which nothing contradicts, and what it takes.
+
+    Attributes
+    ----------
+    found : RobotPosterior
+    covariance : (c, c) array
+        Of the values.
+    change : (c,) array
+        Of the values, the steps of the search together.
+    """
 
     found: RobotPosterior
     covariance: Floats
+    change: Floats
 
 
 def explained_by(
@@ -63,17 +73,19 @@ def explained_by(
     progress : function of a share between 0 and 1
     """
     found = replace(found, unknowns=_with_error_of_loops(found))
+    moved: Floats | float = 0.0
     for part in shares_of(progress, _TRIES):
         change, covariance = _least_squares(found, cause.slopes(found), cause.usual)
         if not _far(change, covariance):  # nor where the readings do not tell it
             break
+        moved = moved + change
         unknowns, holds, state = cause.changed(found, holds, change)
         found = estimate(unknowns, holds, state, part)
     else:
         return None
     if not found.converged or trust(found) < SIGNIFICANT or found.noise.balance > _HELD_BY:
         return None
-    return Explained(found, covariance)
+    return Explained(found, covariance, moved * np.ones_like(change))
 
 
 def _with_error_of_loops(found: RobotPosterior) -> Unknowns:
@@ -89,7 +101,7 @@ def _far(change: Floats, covariance: Floats) -> bool:
     return bool(squared > _STILL**2)
 
 
-def _least_squares(found: RobotPosterior, slopes: Floats, usual: float) -> tuple[Floats, Floats]:
+def _least_squares(found: RobotPosterior, slopes: Floats, usual: float | Floats) -> tuple[Floats, Floats]:
     """The change ``(c,)`` of further unknowns on which all residuals depend, and its covariance ``(c, c)``.
 
     Parameters
@@ -98,15 +110,30 @@ def _least_squares(found: RobotPosterior, slopes: Floats, usual: float) -> tuple
         At its mode.
     slopes : (p, k, c) array
         Of the residuals by them.
-    usual : float
+    usual : float or (c,) array
         Standard deviation of each before anything was read.
+    """
+    information, score = read_of(found, slopes)
+    before = np.broadcast_to(usual, score.shape)
+    covariance = inv(information + np.diag(before**-2.0))
+    return -covariance @ score, covariance
+
+
+def read_of(found: RobotPosterior, slopes: Floats) -> tuple[Floats, Floats]:
+    """What was read says of further unknowns: information ``(c, c)``, and slope of half the sum of squares ``(c,)``.
+
+    Parameters
+    ----------
+    found : RobotPosterior
+        At its mode.
+    slopes : (p, k, c) array
+        Of the residuals by them.
     """
     e = found.equations
     by_own = np.einsum("pkc,pkh->phc", slopes, e.by_hold)
     by_robot = np.einsum("pkc,pkm->mc", slopes, e.by_robot) + np.einsum("phc,phm->mc", by_own, found.by_robot)
     alone = found.hold_covariance - found.by_robot @ found.covariance @ found.by_robot.mT
     taken_up = np.einsum("pic,pij,pjd->cd", by_own, alone, by_own) + by_robot.T @ found.covariance @ by_robot
-    read = np.einsum("pkc,pkd->cd", slopes, slopes) - taken_up
-    covariance = inv(read + np.eye(len(read)) / usual**2)
+    information = np.einsum("pkc,pkd->cd", slopes, slopes) - taken_up
     score = np.einsum("pkc,pk->c", slopes, e.residual)
-    return -covariance @ score, covariance
+    return information, score

@@ -12,12 +12,13 @@ from wirebayes.progress import Progress
 from wirebayes.result_warnings import Notice
 from wirebayes.robot.self_calibration.equations import Holds
 from wirebayes.robot.self_calibration.estimate import estimate, progress_of
-from wirebayes.robot.self_calibration.faults import Explanation, explanations
+from wirebayes.robot.self_calibration.faults import Explanation, explanations, sensors_explain
 from wirebayes.robot.self_calibration.posterior import RobotPosterior
 from wirebayes.robot.self_calibration.residuals import lost, misfit, trust, usual_joint
 from wirebayes.robot.self_calibration.seeds import best, near_requests
 from wirebayes.robot.self_calibration.sensors import Suspects, suspects
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
+from wirebayes.robot.self_calibration.two_causes import two_causes
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 from wirebayes.robot.self_calibration.unlike_wires import unlike_wires
 
@@ -50,7 +51,7 @@ class Searched:
     at_fault : Suspects or None
         Which sensor would explain what contradicts; None where nothing does, or nothing that a sensor could.
     explain : tuple of Explanation
-        Of platform and frame, with each of which nothing would contradict.
+        Of platform and frame, with each of which nothing would contradict; else of two causes together.
     unlike : tuple of Notice
         How unlike what is stated wires would be with which nothing would contradict.
     inexact : bool
@@ -105,8 +106,11 @@ def searched(
     p = trust(found)
     at_fault = _sensor_at_fault(found, holds, p, progress)
     tells = _contradicts(found, p) and _carries(holds)
-    explain = explanations(found, holds, progress) if tells else ()
+    explain: tuple[Explanation, ...] = explanations(found, holds, progress) if tells else ()
     unlike = unlike_wires(found) if found.converged and p < SIGNIFICANT else ()
+    if tells and not (explain or unlike or sensors_explain(at_fault)):
+        both = two_causes(found, holds, progress_of(progress, "two causes"))
+        explain = () if both is None else (both,)
     inexact = unknowns.errors.joint_m == 0 and not (found.converged and p >= SIGNIFICANT)
     if inexact and misfit(found) < _GROSS:
         # how far from exact the joint values are tells more than that there is no answer

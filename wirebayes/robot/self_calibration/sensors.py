@@ -273,7 +273,11 @@ def sensor_notices(found: Suspects | None) -> list[Notice]:
     if found is None or not found.p_none < SIGNIFICANT:
         return []
     if not found.wires:
-        text = f"several tension sensors are off ({chance(found.p_none)} if none were): do not use these values"
+        text = (
+            "no single cause that was tried explains what contradicts: several tension sensors are off "
+            f"({chance(found.p_none)} if none were), or more than one value of the robot's file is wrong; do not use "
+            "these values"
+        )
         return [Notice("misfit", text)]
     texts = [_in_words(i, found.bias_N[i], found.sd_N[i]) for i in found.wires]
     said = f"the tension sensor of {' or of '.join(texts)} would explain {_how_much(found)}what contradicts"

@@ -64,6 +64,16 @@ def _most_unlike(found: RobotPosterior) -> tuple[str, float, float]:
 
 def _mean_logarithms(found: RobotPosterior) -> dict[str, Floats]:
     """How the mean logarithm of each parameter of all wires follows the white unknowns of the lines."""
+    return {name: slopes.mean(0) for name, slopes in logarithms_of_legs(found).items()}
+
+
+def logarithms_of_legs(found: RobotPosterior) -> dict[str, Floats]:
+    """How the logarithm of each parameter of every wire ``(w, m)`` follows the white unknowns of the lines.
+
+    Parameters
+    ----------
+    found : RobotPosterior
+    """
     unknowns = found.unknowns
     mean, root = unknowns.moments
     first = unknowns.slices["wires"].start
@@ -76,5 +86,5 @@ def _mean_logarithms(found: RobotPosterior) -> dict[str, Floats]:
         if not (about.theta[name] > 0).all():  # a wire that does not creep
             continue
         ratio = np.log(wires.theta[name]) - np.log(about.theta[name])
-        out[name] = np.asarray(np.broadcast_to(ratio, (unknowns.robot.legs, ratio.shape[1])).mean(0) / _STEP)
+        out[name] = np.asarray(np.broadcast_to(ratio, (unknowns.robot.legs, ratio.shape[1])) / _STEP)
     return out
